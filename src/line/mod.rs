@@ -1,0 +1,93 @@
+//! The line pass: which line each sample sees. Pure image work on [`SampleBuffer`]s (OG18 section 3, DESIGN section 3).
+//!
+//! [`brute`] is the definition as plain loops and the oracle for [`search`], which gives the same bits much sooner.
+
+pub mod brute;
+pub mod differ;
+pub mod rules;
+pub mod search;
+pub mod window;
+
+pub use differ::Fired;
+pub use rules::Rules;
+pub use window::Window;
+
+use crate::sample::{NodePath, PixelRect, SampleBuffer};
+
+/// How lines are searched. Both give the same lines, bit for bit.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Method {
+    /// Bounds and cut-offs.
+    #[default]
+    Exact,
+    /// Every neighbour of every sample.
+    Brute,
+}
+
+/// What kind of feature a line marks (DESIGN section 3.6), by the strongest reason, in this order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum LineType {
+    /// One side is a miss.
+    Outline,
+    /// The objects differ.
+    Silhouette,
+    /// The materials differ.
+    Material,
+    /// The normals differ.
+    Crease,
+    /// The texture coordinates differ.
+    Uv,
+    /// The feature colours differ.
+    Feature,
+}
+
+/// The line that a sample sees.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SeenLine {
+    /// The line's colour, tinted if the rules say so.
+    pub color: [f32; 3],
+    /// min(1, width / minimum width).
+    pub alpha: f32,
+    /// The sample's colour with the line in it.
+    pub lined: [f32; 3],
+    /// At which node the line was found.
+    pub path: NodePath,
+    /// Which tests fired.
+    pub fired: Fired,
+    /// The neighbour: pixel and sample number.
+    pub neighbor: ([i32; 2], u32),
+    /// Whether the target's own line attributes style it (else the neighbour's do).
+    pub own: bool,
+}
+
+/// The lines of a rectangle: which samples see one, in the order of samples.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LineBuffer {
+    /// The pixels.
+    pub rect: PixelRect,
+    /// Sample indices (as in the [`SampleBuffer`] of the same rectangle), rising.
+    pub samples: Vec<u32>,
+    /// The line of each.
+    pub lines: Vec<SeenLine>,
+    /// Work done, for `--stats`.
+    pub counts: LineCounts,
+}
+
+/// Work done by the line pass.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct LineCounts {
+    /// Target–neighbour pairs whose attributes or distance were looked at.
+    pub pairs_tested: u64,
+    /// Samples that see a line.
+    pub lined_samples: u64,
+}
+
+/// Finds the line of every sample of `target`. `window` must hold all samples of the picture within
+/// [`Rules::reach`] pixels around it.
+#[must_use]
+pub fn find_lines(window: &Window<'_>, target: &SampleBuffer, rules: &Rules, method: Method) -> LineBuffer {
+    match method {
+        Method::Exact => search::find_lines(window, target, rules),
+        Method::Brute => brute::find_lines(window, target, rules),
+    }
+}

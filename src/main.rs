@@ -1,0 +1,3 @@
+//! The `tusche` command: arguments in, exit code out.
+
+fn main() {}

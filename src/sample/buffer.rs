@@ -1,0 +1,277 @@
+//! The columns of a rectangle of samples, and how they are filled.
+
+use super::gate::GateCounts;
+use super::path::NodePath;
+
+/// A rectangle of pixels: `x0 ≤ x < x1`, `y0 ≤ y < y1`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct PixelRect {
+    /// Left, included.
+    pub x0: i32,
+    /// Top, included.
+    pub y0: i32,
+    /// Right, excluded.
+    pub x1: i32,
+    /// Bottom, excluded.
+    pub y1: i32,
+}
+
+impl PixelRect {
+    /// The rectangle of a picture.
+    #[must_use]
+    pub fn of_size(size: [u32; 2]) -> Self {
+        Self { x0: 0, y0: 0, x1: size[0] as i32, y1: size[1] as i32 }
+    }
+
+    /// Width in pixels.
+    #[must_use]
+    pub fn width(&self) -> u32 {
+        (self.x1 - self.x0).max(0) as u32
+    }
+
+    /// Height in pixels.
+    #[must_use]
+    pub fn height(&self) -> u32 {
+        (self.y1 - self.y0).max(0) as u32
+    }
+
+    /// Number of pixels.
+    #[must_use]
+    pub fn pixels(&self) -> usize {
+        self.width() as usize * self.height() as usize
+    }
+
+    /// Whether a pixel lies inside.
+    #[must_use]
+    pub fn contains(&self, x: i32, y: i32) -> bool {
+        (self.x0..self.x1).contains(&x) && (self.y0..self.y1).contains(&y)
+    }
+
+    /// Larger by `margin` pixels on all sides.
+    #[must_use]
+    pub fn grown(&self, margin: i32) -> Self {
+        Self { x0: self.x0 - margin, y0: self.y0 - margin, x1: self.x1 + margin, y1: self.y1 + margin }
+    }
+
+    /// What both cover; empty rectangles have no pixels.
+    #[must_use]
+    pub fn intersection(&self, other: &Self) -> Self {
+        let x0 = self.x0.max(other.x0);
+        let y0 = self.y0.max(other.y0);
+        Self { x0, y0, x1: self.x1.min(other.x1).max(x0), y1: self.y1.min(other.y1).max(y0) }
+    }
+}
+
+/// A column of values, or one value for all rows. A column that the plan does not name is constant at its neutral
+/// value and takes no memory.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Column<T> {
+    /// Every row has this value.
+    Constant(T),
+    /// One value per row.
+    Values(Vec<T>),
+}
+
+impl<T: Copy> Column<T> {
+    /// The value of a row.
+    #[inline]
+    #[must_use]
+    pub fn get(&self, row: usize) -> T {
+        match self {
+            Self::Constant(value) => *value,
+            Self::Values(values) => values[row],
+        }
+    }
+
+    /// Bytes of heap memory.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        match self {
+            Self::Constant(_) => 0,
+            Self::Values(values) => values.len() * size_of::<T>(),
+        }
+    }
+}
+
+/// The colour of a sample before lines.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SampleColor {
+    /// Linear radiance.
+    pub color: [f32; 3],
+    /// 1, or 0 where the camera sees a transparent background.
+    pub alpha: f32,
+}
+
+/// One node, as the tracer hands it to the builder.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Node {
+    /// 1 + object id; 0 is a miss.
+    pub object: u32,
+    /// 1 + material id; 0 is a miss.
+    pub shader: u32,
+    /// Texture coordinates.
+    pub uv: [f32; 2],
+    /// Unit shading normal (world space).
+    pub normal: [f32; 3],
+    /// Feature colour.
+    pub feature: [f32; 3],
+    /// Path length from the camera; ∞ for a miss.
+    pub depth: f32,
+    /// Line colour, linear.
+    pub line_color: [f32; 3],
+    /// Full line width in pixels; ≤ 0 is no line.
+    pub line_width: f32,
+    /// Line priority.
+    pub priority: i32,
+    /// Product of the weights along the path from the camera, 1 at the camera.
+    pub throughput: [f32; 3],
+    /// What this node and its subtree add to the sample's colour (throughput included).
+    pub contribution: [f32; 3],
+}
+
+impl Default for Node {
+    /// A miss at the camera.
+    fn default() -> Self {
+        Self {
+            object: 0,
+            shader: 0,
+            uv: [0.0; 2],
+            normal: [0.0, 0.0, 1.0],
+            feature: [0.0; 3],
+            depth: f32::INFINITY,
+            line_color: [0.0; 3],
+            line_width: 0.0,
+            // A miss never decides a line's style, whatever the objects' priorities.
+            priority: i32::MIN,
+            throughput: [1.0; 3],
+            contribution: [0.0; 3],
+        }
+    }
+}
+
+/// Which node columns are kept. Derived by the plan.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct NodeColumnSet {
+    /// The uv test or layer is on.
+    pub uv: bool,
+    /// The normal test or layer is on.
+    pub normal: bool,
+    /// The feature test or layer is on.
+    pub feature: bool,
+    /// Lines are on: line colour, line width, priority.
+    pub lines: bool,
+    /// Tint or throughput composition is on and there are secondary paths.
+    pub throughput: bool,
+    /// Throughput composition is on.
+    pub contribution: bool,
+}
+
+/// All nodes at one path, in the order of their samples.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NodeColumns {
+    /// The path.
+    pub path: NodePath,
+    /// For each pixel of the rectangle (row by row) and one past the last: its first row.
+    pub first: Vec<u32>,
+    /// The sample of each row (index into the buffer). Rows are sorted by it.
+    pub sample: Vec<u32>,
+    /// 1 + object id; 0 is a miss.
+    pub object: Column<u32>,
+    /// 1 + material id; 0 is a miss.
+    pub shader: Column<u32>,
+    /// Texture coordinates.
+    pub uv: Column<[f32; 2]>,
+    /// Unit shading normals.
+    pub normal: Column<[f32; 3]>,
+    /// Feature colours.
+    pub feature: Column<[f32; 3]>,
+    /// Path lengths from the camera.
+    pub depth: Column<f32>,
+    /// Line colours.
+    pub line_color: Column<[f32; 3]>,
+    /// Line widths in pixels.
+    pub line_width: Column<f32>,
+    /// Line priorities.
+    pub priority: Column<i32>,
+    /// Path throughputs.
+    pub throughput: Column<[f32; 3]>,
+    /// Subtree contributions.
+    pub contribution: Column<[f32; 3]>,
+}
+
+/// All samples of a rectangle of pixels.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SampleBuffer {
+    /// The pixels.
+    pub rect: PixelRect,
+    /// Samples per pixel; sample `s` of the pixel at (x, y) has index ((y − y0) · width + x − x0) · n + s.
+    pub samples_per_pixel: u32,
+    /// Offsets inside the pixel, 0 … 1.
+    pub offset: Vec<[f32; 2]>,
+    /// Colours without lines.
+    pub color: Vec<SampleColor>,
+    /// World positions at the camera's nodes, if the plan names them.
+    pub position: Column<[f32; 3]>,
+    /// Extra outputs at the camera's nodes, in the plan's order of names.
+    pub aovs: Vec<Column<[f32; 3]>>,
+    /// The nodes by path, in the order of [`NodePath`]; the first is the camera's, which every sample has.
+    pub paths: Vec<NodeColumns>,
+    /// What the gate stopped, by `shader` value of the node (0: misses).
+    pub gate: Vec<GateCounts>,
+}
+
+/// Fills a [`SampleBuffer`]. Nodes of one path may arrive in any order of samples.
+#[derive(Debug)]
+pub struct SampleBufferBuilder {
+    rect: PixelRect,
+}
+
+/// What a [`SampleBufferBuilder`] keeps.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SampleLayout {
+    /// Samples per pixel.
+    pub samples_per_pixel: u32,
+    /// Columns of the nodes.
+    pub columns: NodeColumnSet,
+    /// Whether the camera's nodes keep their world position.
+    pub position: bool,
+    /// How many extra outputs the camera's nodes keep.
+    pub aovs: usize,
+    /// Line widths above this are clamped by the gate.
+    pub max_width: f32,
+    /// Materials in the scene: `shader` values are 0 … this, included.
+    pub materials: usize,
+}
+
+impl SampleBufferBuilder {
+    /// An empty buffer for a rectangle: black, transparent samples without nodes.
+    #[must_use]
+    pub fn new(rect: PixelRect, layout: &SampleLayout) -> Self {
+        let _ = layout;
+        Self { rect }
+    }
+
+    /// Sets a sample's place in its pixel and its colour. The gate checks the colour; `shader` is who made it.
+    pub fn set_sample(&mut self, sample: u32, offset: [f32; 2], color: SampleColor, shader: u32) {
+        let _ = (sample, offset, color, shader, self.rect);
+        todo!()
+    }
+
+    /// Sets what only the camera's node of a sample keeps: position and extra outputs (as many as the layout says).
+    pub fn set_extras(&mut self, sample: u32, position: [f32; 3], aovs: &[[f32; 3]]) {
+        let _ = (sample, position, aovs);
+        todo!()
+    }
+
+    /// Adds a node. Columns that the layout does not keep are dropped here; the gate checks the others.
+    pub fn push(&mut self, path: NodePath, sample: u32, node: Node) {
+        let _ = (path, sample, node);
+        todo!()
+    }
+
+    /// Sorts the nodes and closes the buffer. Every sample must have a camera node by now.
+    #[must_use]
+    pub fn finish(self) -> SampleBuffer {
+        todo!()
+    }
+}

@@ -1,0 +1,95 @@
+//! Cameras: from a film position to a ray.
+
+use crate::diag::Diagnostic;
+use crate::math::{DMat3, DVec3, Vec3, portable};
+
+/// How directions relate to film positions.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Projection {
+    /// A pinhole.
+    Perspective {
+        /// Vertical field of view in radians, 0 < fov < π.
+        fov_y: f64,
+    },
+    /// Parallel rays.
+    Orthographic {
+        /// Height of the view in world units, > 0.
+        height: f64,
+    },
+}
+
+/// A camera. Film positions are in pixels from the upper left corner of the picture.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Camera {
+    /// Its name, for `--camera`.
+    pub name: String,
+    /// Perspective or orthographic.
+    pub projection: Projection,
+    /// World position.
+    pub position: DVec3,
+    /// Rotation of the camera's axes into the world: columns are right, up and *backward*.
+    pub world_from_camera: DMat3,
+}
+
+impl Camera {
+    /// A camera at `position` that looks at `target`, with `up` pointing upwards in the picture.
+    ///
+    /// # Errors
+    /// If the camera looks at itself, along its up vector, or a number is not finite.
+    pub fn look_at(
+        name: impl Into<String>,
+        projection: Projection,
+        position: DVec3,
+        target: DVec3,
+        up: DVec3,
+    ) -> Result<Self, Diagnostic> {
+        if !(position.is_finite() && target.is_finite() && up.is_finite()) {
+            return Err(Diagnostic::error("camera position, target and up must be finite numbers"));
+        }
+        let backward = (position - target)
+            .try_normalize()
+            .ok_or_else(|| Diagnostic::error("the camera looks at itself: position and target are the same point"))?;
+        let right = up
+            .try_normalize()
+            .map(|up| up.cross(backward))
+            .filter(|right| right.length() > 1e-9)
+            .ok_or_else(|| Diagnostic::error("the camera's up vector is zero or points along the line of sight"))?
+            .normalize();
+        let up = backward.cross(right);
+        Ok(Self { name: name.into(), projection, position, world_from_camera: DMat3::from_cols(right, up, backward) })
+    }
+
+    /// The ray through a film position of a picture of `size` pixels.
+    ///
+    /// The origin is relative to the camera's position, so that rays keep their precision far from the world's origin.
+    /// The film position is a whole pixel plus an offset in 0 … 1, so that wide pictures keep theirs. The direction
+    /// has unit length.
+    #[must_use]
+    pub fn ray(&self, size: [u32; 2], pixel: [i32; 2], offset: [f32; 2]) -> (Vec3, Vec3) {
+        let [width, height] = size.map(f64::from);
+        let x = (f64::from(pixel[0]) - width / 2.0 + f64::from(offset[0])) / (height / 2.0);
+        let y = -(f64::from(pixel[1]) - height / 2.0 + f64::from(offset[1])) / (height / 2.0);
+        match self.projection {
+            Projection::Perspective { fov_y } => {
+                let half = libm::tan(fov_y / 2.0);
+                let direction = self.world_from_camera * DVec3::new(x * half, y * half, -1.0);
+                (Vec3::ZERO, direction.normalize().as_vec3())
+            }
+            Projection::Orthographic { height } => {
+                let half = height / 2.0;
+                let origin = self.world_from_camera * DVec3::new(x * half, y * half, 0.0);
+                (origin.as_vec3(), -self.world_from_camera.z_axis.as_vec3().normalize())
+            }
+        }
+    }
+
+    /// The angle between the rays of neighbouring pixels in the middle of the picture (radians; 0 if parallel) and
+    /// the distance between their origins (world units; 0 if they meet).
+    #[must_use]
+    pub fn pixel_spread(&self, height_px: u32) -> (f32, f32) {
+        match self.projection {
+            Projection::Perspective { fov_y } => (2.0 * portable::tan((fov_y / 2.0) as f32) / height_px as f32, 0.0),
+            Projection::Orthographic { height } => (0.0, (height / f64::from(height_px)) as f32),
+        }
+    }
+}

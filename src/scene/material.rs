@@ -1,0 +1,58 @@
+//! Materials: a script with its parameters.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use super::ids::ScriptId;
+use super::texture::TextureRef;
+use crate::diag::{Source, Span};
+use crate::math::{Vec2, Vec3, Vec4};
+
+/// A Rhai script that some material uses. Compiled by [`crate::shade`].
+#[derive(Clone, Debug)]
+pub struct Script {
+    /// The text; its name is how messages call it.
+    pub source: Arc<Source>,
+    /// Where it was read from; `None` for scripts built into Tusche or made by code.
+    pub path: Option<PathBuf>,
+}
+
+/// A parameter's value as written in a scene file or a model.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ParamValue {
+    /// `true` or `false`.
+    Bool(bool),
+    /// A whole number.
+    Int(i64),
+    /// A number.
+    Float(f32),
+    /// Two numbers.
+    Vec2(Vec2),
+    /// Three numbers: a vector or a linear colour.
+    Vec3(Vec3),
+    /// Four numbers.
+    Vec4(Vec4),
+    /// A text.
+    Text(String),
+    /// A texture.
+    Texture(TextureRef),
+}
+
+/// A script with parameters. Each material is one "shader" to the line test of that name.
+#[derive(Clone, Debug)]
+pub struct Material {
+    /// Its name in the scene file or the model.
+    pub name: String,
+    /// The script.
+    pub script: ScriptId,
+    /// Values that replace the defaults of the script's `params()`, each with the place that set it.
+    pub params: BTreeMap<String, (ParamValue, Option<Span>)>,
+    /// Priority of its surfaces where neither the script nor the object gives one.
+    pub priority: Option<i32>,
+    /// Whether surfaces are seen from behind. Single-sided surfaces are invisible from behind to camera, reflection
+    /// and refraction rays, but cast shadows.
+    pub double_sided: bool,
+    /// Where it was declared.
+    pub span: Option<Span>,
+}

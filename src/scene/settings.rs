@@ -1,0 +1,158 @@
+//! Picture, background and line settings, all resolved: no later stage knows that a value was optional.
+
+use bitflags::bitflags;
+
+use super::ids::TextureId;
+use crate::math::Vec3;
+
+/// A reconstruction filter's shape; its radius stands beside it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FilterKind {
+    /// Constant.
+    Box,
+    /// Falls linearly to 0 at the radius.
+    Tent,
+    /// exp(−2 x²), lowered to reach 0 at the radius.
+    Gaussian,
+    /// Mitchell and Netravali's cubic with B = C = 1/3, stretched to the radius.
+    Mitchell,
+    /// The four-term Blackman-Harris window.
+    BlackmanHarris,
+}
+
+/// `[render]`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RenderSettings {
+    /// Width and height in pixels, each at least 1.
+    pub size: [u32; 2],
+    /// Samples per pixel, at least 1.
+    pub samples: u32,
+    /// Chooses the sample positions.
+    pub seed: u64,
+    /// What rays that leave the scene see.
+    pub background: Background,
+    /// The pixel filter.
+    pub filter: FilterKind,
+    /// Its radius in pixels, > 0.
+    pub filter_radius: f32,
+    /// Most mirror reflections in a row along a path.
+    pub reflection_depth: u32,
+    /// Most refractions along a path.
+    pub refraction_depth: u32,
+}
+
+impl Default for RenderSettings {
+    fn default() -> Self {
+        Self {
+            size: [1280, 720],
+            samples: 16,
+            seed: 0,
+            background: Background::Color(Vec3::splat(0.9)),
+            filter: FilterKind::BlackmanHarris,
+            filter_radius: 1.5,
+            reflection_depth: 4,
+            refraction_depth: 8,
+        }
+    }
+}
+
+/// What rays that leave the scene see.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Background {
+    /// Black, and transparent to the camera.
+    Transparent,
+    /// One linear colour.
+    Color(Vec3),
+    /// Between two linear colours, by the height of the ray's direction.
+    Gradient {
+        /// Straight down.
+        bottom: Vec3,
+        /// Straight up.
+        top: Vec3,
+    },
+    /// A latitude-longitude image around the scene.
+    Image {
+        /// The image.
+        texture: TextureId,
+        /// Multiplies it.
+        strength: f32,
+    },
+}
+
+bitflags! {
+    /// Kinds of rays: what an object can be visible to, and which paths draw lines.
+    #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+    pub struct RayKinds: u8 {
+        /// Rays from the camera.
+        const CAMERA = 1;
+        /// Mirrored rays.
+        const REFLECTION = 2;
+        /// Refracted rays, and rays that go on through a see-through surface.
+        const REFRACTION = 4;
+        /// Rays towards lights.
+        const SHADOW = 8;
+    }
+}
+
+/// How a line at a reflected or refracted node enters the sample's colour.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Composition {
+    /// The sample takes the line's colour (OG18).
+    Replace,
+    /// Only that node's part of the sample is replaced.
+    Throughput,
+}
+
+/// `[lines]`: DESIGN section 3.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LineSettings {
+    /// Whether lines are drawn at all (`--lines off`).
+    pub enabled: bool,
+    /// Colour of lines whose shader gives none, linear.
+    pub color: Vec3,
+    /// Full width in pixels of lines whose shader gives none.
+    pub width: f32,
+    /// Bounds the stencil; wider requests are clamped.
+    pub max_width: f32,
+    /// Thinner lines are drawn this wide and more transparent (OG18 section 3.5), in pixels.
+    pub min_width: f32,
+    /// Whether widths are corrected for the thinning of the sample test.
+    pub width_compensation: bool,
+    /// Where object ids differ.
+    pub object: bool,
+    /// Where materials differ.
+    pub shader: bool,
+    /// Where uv differ by more than this distance.
+    pub uv: Option<f32>,
+    /// Where shading normals differ by more than this angle in degrees.
+    pub normal: Option<f32>,
+    /// Where any channel of the feature colours differs by more than this.
+    pub feature: Option<f32>,
+    /// Which paths draw lines; `SHADOW` is not among them.
+    pub paths: RayKinds,
+    /// Whether lines in reflections and refractions take the path's throughput as tint.
+    pub tint: bool,
+    /// How they enter the sample.
+    pub compose: Composition,
+}
+
+impl Default for LineSettings {
+    fn default() -> Self {
+        Self {
+            enabled: true,
+            color: Vec3::ZERO,
+            width: 2.0,
+            max_width: 8.0,
+            min_width: 0.5,
+            width_compensation: true,
+            object: true,
+            shader: true,
+            uv: None,
+            normal: None,
+            feature: None,
+            paths: RayKinds::CAMERA.union(RayKinds::REFLECTION).union(RayKinds::REFRACTION),
+            tint: true,
+            compose: Composition::Replace,
+        }
+    }
+}

@@ -1,0 +1,24 @@
+//! The script host: Rhai scripts as surface shaders (DESIGN section 4).
+//!
+//! 1. [`Host`] holds what scripts may call: the library, and whatever a Rust user registers.
+//! 2. [`Shaders::compile`] compiles the scene's scripts and, for each material, runs the [`analysis`]: what it reads,
+//!    what it writes, within which bounds.
+//! 3. Hits of one material are gathered into a [`HitBatch`] (only the inputs it reads) and shaded into an
+//!    [`OutputBatch`] (only the outputs that the plan needs) by a [`Shading`] context, one per thread.
+//!
+//! What the interpreter returns is what a script means; anything faster must match it bit for bit.
+
+pub mod analysis;
+pub mod batch;
+pub mod host;
+pub mod interpret;
+pub mod library;
+pub mod names;
+pub mod program;
+
+pub use analysis::Analysis;
+pub use batch::{HitBatch, LightSample, OutputBatch};
+pub use host::Host;
+pub use interpret::{ShadeErrors, Shading};
+pub use names::{InputSet, OutputSet, PathKind};
+pub use program::{Mode, Shader, Shaders};
