@@ -78,3 +78,11 @@ pub struct TextureRef {
     /// Applied to the uv of the mesh before the lookup (KHR_texture_transform).
     pub transform: Affine2,
 }
+
+impl Texture {
+    /// stub
+    #[must_use]
+    pub fn sample(&self, _uv: crate::math::Vec2) -> crate::math::Vec4 {
+        todo!()
+    }
+}

@@ -10,15 +10,19 @@
 
 pub mod analysis;
 pub mod batch;
+pub mod bsdf;
 pub mod host;
 pub mod interpret;
 pub mod library;
+pub mod lighting;
 pub mod names;
 pub mod program;
 
 pub use analysis::Analysis;
+pub use bsdf::Bsdf;
 pub use batch::{HitBatch, LightSample, OutputBatch};
 pub use host::Host;
 pub use interpret::{ShadeErrors, Shading};
+pub use lighting::Lighting;
 pub use names::{InputSet, OutputSet, PathKind};
 pub use program::{Mode, Shader, Shaders};

@@ -1,0 +1,134 @@
+//! Arguments as meant: the scene, its shaders and its plan.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use super::args::{LineMode, SceneArguments};
+use super::{Failure, terminal};
+use crate::diag::{Diagnostic, Diagnostics, nearest};
+use crate::files::FileStore;
+use crate::film::Layer;
+use crate::plan::Plan;
+use crate::scene::{Scene, SceneBuilder, file};
+use crate::shade::{Host, OutputSet, Shaders};
+
+/// The picture that the arguments ask for, ready to be rendered.
+pub(super) struct Request {
+    pub scene: Scene,
+    pub shaders: Shaders,
+    pub plan: Plan,
+    /// Where to write, and which layers.
+    pub outputs: Vec<(PathBuf, Vec<Layer>)>,
+    /// Seconds spent on getting here.
+    pub load_seconds: f64,
+}
+
+impl Request {
+    /// Loads, resolves and compiles everything; warnings are printed unless `--quiet`.
+    pub fn new(arguments: &SceneArguments, frame: Option<f64>, outputs: &[PathBuf]) -> Result<Self, Failure> {
+        let start = Instant::now();
+        let files = FileStore::new();
+        let (builder, mut warnings) = load(arguments, frame, &files)?;
+        let scene = builder.build()?;
+        let (shaders, more) = Shaders::compile(&scene, &Host::new())?;
+        warnings.extend(more);
+        if !arguments.quiet {
+            terminal::say(&warnings);
+        }
+        let outputs = outputs
+            .iter()
+            .map(|path| Ok((path.clone(), layers_of(path, &arguments.layer, &shaders)?)))
+            .collect::<Result<Vec<_>, Diagnostic>>()?;
+        let mut layers: Vec<Layer> = outputs.iter().flat_map(|(_, layers)| layers.clone()).collect();
+        layers.sort();
+        layers.dedup();
+        let plan = Plan::new(&scene, &shaders, &layers);
+        Ok(Self { scene, shaders, plan, outputs, load_seconds: start.elapsed().as_secs_f64() })
+    }
+}
+
+/// Where to write: what `-o` says, else the scene's name with `.png` in the current folder.
+pub(super) fn output_paths(arguments: &SceneArguments) -> Result<Vec<PathBuf>, Failure> {
+    if arguments.output.is_empty() {
+        let stem = arguments.scene.file_stem().unwrap_or("picture".as_ref());
+        return Ok(vec![Path::new(stem).with_extension("png")]);
+    }
+    for (index, path) in arguments.output.iter().enumerate() {
+        if arguments.output[..index].contains(path) {
+            return Err(Failure::Usage(format!("`{}` is given twice as output", path.display())));
+        }
+    }
+    Ok(arguments.output.clone())
+}
+
+fn load(
+    arguments: &SceneArguments,
+    frame: Option<f64>,
+    files: &FileStore,
+) -> Result<(SceneBuilder, Diagnostics), Failure> {
+    let overrides = arguments.set.iter().map(|text| file::Override::parse(text)).collect::<Vec<_>>();
+    let mut faults = Diagnostics::default();
+    let overrides: Vec<_> = overrides
+        .into_iter()
+        .filter_map(|parsed| parsed.map_err(|fault| faults.push(fault)).ok())
+        .collect();
+    if faults.has_errors() {
+        return Err(faults.into());
+    }
+    let options = file::LoadOptions { frame, camera: arguments.camera.clone() };
+    let (mut builder, warnings) = file::load(&arguments.scene, files, &overrides, &options)?;
+    if let Some(size) = arguments.size {
+        builder.render.size = size.0;
+    }
+    if let Some(samples) = arguments.samples.or(arguments.quality.map(|quality| quality.samples())) {
+        builder.render.samples = samples;
+    }
+    if let Some(seed) = arguments.seed {
+        builder.render.seed = seed;
+    }
+    builder.lines.enabled &= arguments.lines != LineMode::Off;
+    Ok((builder, warnings))
+}
+
+/// The layers of an output: those asked for, or a PNG's `rgba` and everything but `line.TYPE` for an EXR.
+fn layers_of(path: &Path, asked: &[String], shaders: &Shaders) -> Result<Vec<Layer>, Diagnostic> {
+    let is_exr = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("exr"));
+    let aovs = shaders.aovs();
+    if !asked.is_empty() {
+        let shown = if is_exr { asked } else { &asked[..1] };
+        return shown.iter().map(|name| named_layer(name, aovs)).collect();
+    }
+    if !is_exr {
+        return Ok(vec![Layer::Rgba]);
+    }
+    let mut layers = vec![
+        Layer::Rgba,
+        Layer::Color,
+        Layer::Line,
+        Layer::Depth,
+        Layer::Normal,
+        Layer::Position,
+        Layer::Uv,
+        Layer::Object,
+    ];
+    if shaders.iter().any(|shader| shader.analysis().output(OutputSet::FEATURE).may) {
+        layers.push(Layer::Feature);
+    }
+    layers.extend(aovs.iter().enumerate().map(|(index, name)| Layer::Aov(index, name.clone())));
+    Ok(layers)
+}
+
+fn named_layer(name: &str, aovs: &[String]) -> Result<Layer, Diagnostic> {
+    if let Some(aov) = name.strip_prefix("aov_") {
+        return aovs.iter().position(|known| known == aov).map(|index| Layer::Aov(index, aov.to_owned())).ok_or_else(
+            || {
+                let fault = Diagnostic::error(format!("no shader of this scene writes `{name}`"));
+                match nearest(aov, aovs.iter().map(String::as_str)) {
+                    Some(near) => fault.hint(format!("did you mean `aov_{near}`?")),
+                    None => fault,
+                }
+            },
+        );
+    }
+    name.parse()
+}
