@@ -88,9 +88,10 @@ impl<'a> PathWindow<'a> {
         let height = self.tile * self.tiles.len().div_ceil(self.columns.max(1)) as i32;
         let (y0, y1) = (rect.y0.max(self.origin[1]), rect.y1.min(self.origin[1] + height));
         (y0..y1).flat_map(move |y| {
-            self.tiles_in(PixelRect { y0: y, y1: y + 1, ..rect }).map(move |(index, tile)| {
-                let inside = tile.buffer.rect;
-                Segment { index, tile, y, x0: rect.x0.max(inside.x0), x1: rect.x1.min(inside.x1) }
+            let row = PixelRect { y0: y, y1: y + 1, ..rect };
+            self.tiles_in(row).filter_map(move |(index, tile)| {
+                let part = row.intersection(&tile.buffer.rect);
+                (part.pixels() > 0).then_some(Segment { index, tile, y, x0: part.x0, x1: part.x1 })
             })
         })
     }
