@@ -9,10 +9,12 @@
 //! samples. So "the index of a sample" orders samples the same way whatever rectangles a picture is cut into.
 
 pub mod buffer;
+pub mod builder;
 pub mod gate;
 pub mod path;
 pub mod position;
 
-pub use buffer::{Column, Node, NodeColumns, PixelRect, SampleBuffer, SampleBufferBuilder, SampleColor};
+pub use buffer::{Column, Node, NodeColumnSet, NodeColumns, PixelRect, SampleBuffer, SampleColor};
+pub use builder::{HandMadeSample, SampleBufferBuilder, SampleLayout};
 pub use gate::GateCounts;
 pub use path::NodePath;
