@@ -6,7 +6,7 @@ use std::fmt;
 
 use crate::film::{Filter, Layer};
 use crate::line::Rules;
-use crate::sample::buffer::{NodeColumnSet, SampleLayout};
+use crate::sample::{NodeColumnSet, SampleLayout};
 use crate::scene::Scene;
 use crate::scene::ids::MaterialId;
 use crate::scene::settings::{Background, FilterKind, LineSettings, RayKinds};

@@ -51,12 +51,37 @@ impl Grid {
         }
     }
 
+    /// The tiles within `margin` pixels around a tile, that one among them.
+    pub fn around(&self, tile: usize, margin: i32) -> Part {
+        let rect = self.rect(tile).grown(margin).intersection(&self.region);
+        let place = |x: i32, origin: i32| ((x - origin) / self.tile) as usize;
+        let columns = place(rect.x0, self.region.x0)..place(rect.x1 - 1, self.region.x0) + 1;
+        let rows = place(rect.y0, self.region.y0)..place(rect.y1 - 1, self.region.y0) + 1;
+        let side = |index: usize| index as i32 * self.tile;
+        Part {
+            origin: [self.region.x0 + side(columns.start), self.region.y0 + side(rows.start)],
+            columns: columns.len(),
+            tiles: rows.flat_map(|row| columns.clone().map(move |column| row * self.columns + column)).collect(),
+        }
+    }
+
     /// The pixels of a tile.
     pub fn rect(&self, tile: usize) -> PixelRect {
         let x0 = self.region.x0 + (tile % self.columns) as i32 * self.tile;
         let y0 = self.region.y0 + (tile / self.columns) as i32 * self.tile;
         PixelRect { x0, y0, x1: x0 + self.tile, y1: y0 + self.tile }.intersection(&self.region)
     }
+}
+
+/// A rectangle of tiles within a grid.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) struct Part {
+    /// Upper left pixel.
+    pub origin: [i32; 2],
+    /// Tiles per row of the part.
+    pub columns: usize,
+    /// Row by row, as indices into the grid.
+    pub tiles: Vec<usize>,
 }
 
 #[cfg(test)]
@@ -74,6 +99,14 @@ mod tests {
             let pixels: usize = seen.iter().map(|tile| grid.rect(*tile).pixels()).sum();
             assert_eq!(pixels, region.pixels());
         }
+    }
+
+    #[test]
+    fn a_part_holds_the_tiles_that_a_margin_touches() {
+        let grid = Grid::new(PixelRect { x0: 5, y0: 7, x1: 105, y1: 50 }, 10);
+        assert_eq!(grid.around(0, 1), Part { origin: [5, 7], columns: 2, tiles: vec![0, 1, 10, 11] });
+        assert_eq!(grid.around(12, 0), Part { origin: [25, 17], columns: 1, tiles: vec![12] });
+        assert_eq!(grid.around(49, 11), Part { origin: [75, 27], columns: 3, tiles: vec![27, 28, 29, 37, 38, 39, 47, 48, 49] });
     }
 
     #[test]

@@ -16,9 +16,9 @@ use rayon::prelude::*;
 
 use crate::diag::{Diagnostic, Diagnostics};
 use crate::film::{FilmTile, FilmWindow, develop};
-use crate::line::{LineBuffer, LineCounts, LineTile, Method, Window, find_lines};
+use crate::line::{LineBuffer, LineCounts, LineTile, Method, TileBounds, Window, find_lines};
 use crate::plan::Plan;
-use crate::sample::{GateCounts, PixelRect};
+use crate::sample::{GateCounts, PixelRect, SampleBuffer};
 use crate::scene::Scene;
 use crate::scene::ids::MaterialId;
 use crate::shade::{Lighting, ShadeErrors, Shaders};
@@ -114,11 +114,23 @@ struct Render<'a> {
     /// Scratch memory and script engines, one for each thread that ever needed one.
     contexts: Mutex<Vec<TraceContext<'a>>>,
     /// By tile of the grid, while something still needs it.
-    samples: Vec<Option<Box<LineTile>>>,
+    samples: Vec<Option<Box<SampledTile>>>,
     lines: Vec<Option<Box<LineBuffer>>>,
     jobs_done: AtomicUsize,
     totals: Totals,
     complete: bool,
+}
+
+/// A tile of samples, made ready for the line pass if there is one.
+struct SampledTile {
+    buffer: SampleBuffer,
+    bounds: Option<TileBounds>,
+}
+
+impl SampledTile {
+    fn for_lines(&self) -> Option<LineTile<'_>> {
+        Some(LineTile { buffer: &self.buffer, bounds: self.bounds.as_ref()? })
+    }
 }
 
 /// One tile's turn in one stage.
@@ -130,9 +142,9 @@ enum Job {
 
 /// What a job made.
 enum Product {
-    Sampled(usize, Box<TracedTile>),
-    Lined(usize, Box<LineBuffer>, f64),
-    Developed(FilmTile, f64),
+    Sampled { tile: usize, traced: Box<TracedTile>, bounds: Option<TileBounds>, line_seconds: f64 },
+    Lined { tile: usize, lines: Box<LineBuffer>, seconds: f64 },
+    Developed { film: FilmTile, seconds: f64 },
 }
 
 #[derive(Default)]
@@ -232,19 +244,14 @@ impl<'a> Render<'a> {
         }
         let start = Instant::now();
         let product = match job {
-            Job::Sample(tile) => {
-                let free = self.contexts.lock().unwrap_or_else(PoisonError::into_inner).pop();
-                let mut context = free.unwrap_or_else(|| TraceContext::new(self.scene, self.shaders));
-                let traced = self.tracer.trace(self.grid.rect(tile), &mut context);
-                self.contexts.lock().unwrap_or_else(PoisonError::into_inner).push(context);
-                Some(Product::Sampled(tile, Box::new(traced)))
-            }
+            Job::Sample(tile) => Some(self.sample(tile)),
             Job::Line(tile) => self.line(tile).map(|lines| {
-                Product::Lined(tile, Box::new(lines), start.elapsed().as_secs_f64())
+                let seconds = start.elapsed().as_secs_f64();
+                Product::Lined { tile, lines: Box::new(lines), seconds }
             }),
             Job::Develop(tile) => {
                 let film = self.develop(tile);
-                Some(Product::Developed(film, start.elapsed().as_secs_f64()))
+                Some(Product::Developed { film, seconds: start.elapsed().as_secs_f64() })
             }
         };
         let done = self.jobs_done.fetch_add(1, Ordering::Relaxed) + 1;
@@ -255,26 +262,33 @@ impl<'a> Render<'a> {
         product
     }
 
+    fn sample(&self, tile: usize) -> Product {
+        let free = self.contexts.lock().unwrap_or_else(PoisonError::into_inner).pop();
+        let mut context = free.unwrap_or_else(|| TraceContext::new(self.scene, self.shaders));
+        let traced = Box::new(self.tracer.trace(self.grid.rect(tile), &mut context));
+        self.contexts.lock().unwrap_or_else(PoisonError::into_inner).push(context);
+        let start = Instant::now();
+        let bounds = self.plan.lines.as_ref().map(|lines| TileBounds::new(&traced.samples, &lines.rules));
+        Product::Sampled { tile, traced, bounds, line_seconds: start.elapsed().as_secs_f64() }
+    }
+
     fn line(&self, tile: usize) -> Option<LineBuffer> {
-        let rules = &self.plan.lines.as_ref()?.rules;
-        let window = Window {
-            origin: [self.grid.region.x0, self.grid.region.y0],
-            tile: self.grid.tile,
-            columns: self.grid.columns,
-            tiles: self.samples.iter().map(Option::as_deref).collect(),
-        };
-        Some(find_lines(&window, window.tiles[tile]?, rules, self.method))
+        let lines = self.plan.lines.as_ref()?;
+        let part = self.grid.around(tile, lines.reach);
+        let tiles = part.tiles.iter().map(|tile| self.samples[*tile].as_ref()?.for_lines()).collect();
+        let window = Window { origin: part.origin, tile: self.grid.tile, columns: part.columns, tiles };
+        let target = self.samples[tile].as_ref()?.for_lines()?;
+        Some(find_lines(&window, target, &lines.rules, self.method))
     }
 
     fn develop(&self, tile: usize) -> FilmTile {
-        let window = FilmWindow {
-            origin: [self.grid.region.x0, self.grid.region.y0],
-            tile: self.grid.tile,
-            columns: self.grid.columns,
-            tiles: (self.samples.iter().zip(&self.lines))
-                .map(|(samples, lines)| samples.as_ref().map(|samples| (&samples.buffer, lines.as_deref())))
-                .collect(),
+        let part = self.grid.around(tile, self.plan.filter.reach());
+        let of_tile = |tile: &usize| {
+            let samples = self.samples[*tile].as_ref()?;
+            Some((&samples.buffer, self.lines[*tile].as_deref()))
         };
+        let tiles = part.tiles.iter().map(of_tile).collect();
+        let window = FilmWindow { origin: part.origin, tile: self.grid.tile, columns: part.columns, tiles };
         let rect = self.grid.rect(tile).intersection(&self.crop);
         develop(&window, rect, &self.plan.filter, &self.plan.layers)
     }
@@ -287,7 +301,8 @@ impl<'a> Render<'a> {
     ) -> Result<(), Diagnostic> {
         let totals = &mut self.totals;
         match product {
-            Product::Sampled(tile, traced) => {
+            Product::Sampled { tile, traced, bounds, line_seconds } => {
+                totals.seconds.lines += line_seconds;
                 let TracedTile { samples, rays, hits, shade_seconds, seconds } = *traced;
                 let shading: f64 = shade_seconds.iter().sum();
                 totals.seconds.trace += seconds - shading;
@@ -298,14 +313,14 @@ impl<'a> Render<'a> {
                 totals.hits.iter_mut().zip(&hits).for_each(|(total, hits)| *total += hits);
                 totals.shade_seconds.iter_mut().zip(&shade_seconds).for_each(|(total, seconds)| *total += seconds);
                 totals.gate.iter_mut().zip(&samples.gate).for_each(|(total, gate)| *total += *gate);
-                self.samples[tile] = Some(Box::new(LineTile::new(samples, self.plan.lines.as_ref().map(|l| &l.rules))));
+                self.samples[tile] = Some(Box::new(SampledTile { buffer: samples, bounds }));
             }
-            Product::Lined(tile, lines, seconds) => {
+            Product::Lined { tile, lines, seconds } => {
                 totals.seconds.lines += seconds;
                 totals.lines += lines.counts;
                 self.lines[tile] = Some(lines);
             }
-            Product::Developed(film, seconds) => {
+            Product::Developed { film, seconds } => {
                 let start = Instant::now();
                 if film.rect.pixels() > 0 {
                     emit(&film)?;

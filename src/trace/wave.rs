@@ -15,7 +15,7 @@ use super::triangle::Ray;
 use super::world::World;
 use crate::math::Vec3;
 use crate::plan::Plan;
-use crate::sample::buffer::{PixelRect, SampleBuffer, SampleBufferBuilder, SampleColor};
+use crate::sample::{PixelRect, SampleBuffer, SampleBufferBuilder, SampleColor};
 use crate::sample::position::SamplePositions;
 use crate::scene::Scene;
 use crate::scene::settings::{Background, RayKinds};
