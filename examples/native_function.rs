@@ -6,11 +6,10 @@ use std::path::Path;
 
 use tusche::diag::Diagnostics;
 use tusche::files::FileStore;
-use tusche::film::{Layer, Output, OutputSettings};
+use tusche::film::Layer;
 use tusche::math::Vec3;
 use tusche::plan::Plan;
-use tusche::render::{Control, RenderOptions, render};
-use tusche::sample::PixelRect;
+use tusche::render::{Control, PictureFile, RenderOptions, layers_of, render_files};
 use tusche::scene::file;
 use tusche::shade::{Host, Shaders};
 
@@ -47,18 +46,8 @@ fn main() -> Result<(), Diagnostics> {
     let (builder, _warnings) = file::load(Path::new("rings.toml"), &files, &[], &file::LoadOptions::default())?;
     let scene = builder.build()?;
     let (shaders, _warnings) = Shaders::compile(&scene, &host)?;
-    let layers = vec![Layer::Rgba];
-    let plan = Plan::new(&scene, &shaders, &layers);
-    let size = scene.render().size;
-    let mut output = Output::create(OutputSettings {
-        path: "native_function.png".into(),
-        size,
-        crop: PixelRect::of_size(size),
-        layers,
-        transparent: false,
-        metadata: Vec::new(),
-    })?;
-    render(&scene, &shaders, &plan, &RenderOptions::default(), &Control::default(), &mut |tile| output.write(tile))?;
-    output.finish()?;
+    let files = [PictureFile { path: "native_function.png".into(), layers: vec![Layer::Rgba] }];
+    let plan = Plan::new(&scene, &shaders, &layers_of(&files));
+    render_files(&scene, &shaders, &plan, &files, &RenderOptions::default(), &Control::default())?;
     Ok(())
 }

@@ -6,10 +6,9 @@ use std::path::Path;
 
 use tusche::diag::Diagnostics;
 use tusche::files::FileStore;
-use tusche::film::{Layer, Output, OutputSettings};
+use tusche::film::Layer;
 use tusche::plan::Plan;
-use tusche::render::{Control, RenderOptions, render};
-use tusche::sample::PixelRect;
+use tusche::render::{Control, PictureFile, RenderOptions, layers_of, render_files};
 use tusche::scene::file;
 use tusche::shade::{Host, Shaders};
 
@@ -21,25 +20,11 @@ fn main() -> Result<(), Diagnostics> {
     builder.render.size = [320, 180];
     let scene = builder.build()?;
     let (shaders, _warnings) = Shaders::compile(&scene, &Host::new())?;
-    let layers = vec![Layer::Rgba];
-    let plan = Plan::new(&scene, &shaders, &layers);
-
-    // Tiles go into the file as they are finished.
-    let size = scene.render().size;
-    let mut output = Output::create(OutputSettings {
-        path: "render_from_code.png".into(),
-        size,
-        crop: PixelRect::of_size(size),
-        layers,
-        transparent: false,
-        metadata: Vec::new(),
-    })?;
-    let report = render(&scene, &shaders, &plan, &RenderOptions::default(), &Control::default(), &mut |tile| {
-        output.write(tile)
-    })?;
-    output.finish()?;
-
+    let files = [PictureFile { path: "render_from_code.png".into(), layers: vec![Layer::Rgba] }];
+    let plan = Plan::new(&scene, &shaders, &layers_of(&files));
     println!("{plan}");
+
+    let report = render_files(&scene, &shaders, &plan, &files, &RenderOptions::default(), &Control::default())?;
     println!("{} camera rays, {} samples on lines", report.stats.rays.camera, report.stats.lines.lined_samples);
     Ok(())
 }

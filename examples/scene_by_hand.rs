@@ -3,11 +3,10 @@
 //! Run it with `cargo run --release --example scene_by_hand`.
 
 use tusche::diag::{Diagnostics, Source};
-use tusche::film::{Layer, Output, OutputSettings};
+use tusche::film::Layer;
 use tusche::math::{DAffine3, DVec3, Vec3};
 use tusche::plan::Plan;
-use tusche::render::{Control, RenderOptions, render};
-use tusche::sample::PixelRect;
+use tusche::render::{Control, PictureFile, RenderOptions, layers_of, render_files};
 use tusche::scene::camera::{Camera, Projection};
 use tusche::scene::light::{Light, LightKind};
 use tusche::scene::material::{Material, Script};
@@ -76,18 +75,8 @@ fn main() -> Result<(), Diagnostics> {
     let scene = scene.build()?;
 
     let (shaders, _warnings) = Shaders::compile(&scene, &Host::new())?;
-    let layers = vec![Layer::Rgba];
-    let plan = Plan::new(&scene, &shaders, &layers);
-    let size = scene.render().size;
-    let mut output = Output::create(OutputSettings {
-        path: "scene_by_hand.png".into(),
-        size,
-        crop: PixelRect::of_size(size),
-        layers,
-        transparent: false,
-        metadata: Vec::new(),
-    })?;
-    render(&scene, &shaders, &plan, &RenderOptions::default(), &Control::default(), &mut |tile| output.write(tile))?;
-    output.finish()?;
+    let files = [PictureFile { path: "scene_by_hand.png".into(), layers: vec![Layer::Rgba] }];
+    let plan = Plan::new(&scene, &shaders, &layers_of(&files));
+    render_files(&scene, &shaders, &plan, &files, &RenderOptions::default(), &Control::default())?;
     Ok(())
 }

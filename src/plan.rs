@@ -75,8 +75,6 @@ pub struct Plan {
     pub layout: SampleLayout,
     /// The layers that are developed.
     pub layers: Vec<Layer>,
-    /// Names of the extra outputs that samples keep, in order.
-    pub aovs: Vec<String>,
     /// The pixel filter.
     pub filter: Filter,
     explanation: String,
@@ -131,18 +129,13 @@ impl Plan {
             throughput: line_paths && (tests.tint || throughput_composition),
             contribution: lines.is_some() && throughput_composition,
         };
-        let aovs: Vec<String> = layers
-            .iter()
-            .filter_map(|layer| match layer {
-                Layer::Aov(_, name) => Some(name.clone()),
-                _ => None,
-            })
-            .collect();
+        let has_aovs = layers.iter().any(|layer| matches!(layer, Layer::Aov(..)));
+        let aovs = if has_aovs { shaders.aovs().len() } else { 0 };
         let layout = SampleLayout {
             samples_per_pixel: settings.samples,
             columns,
             position: layers.contains(&Layer::Position),
-            aovs: aovs.len(),
+            aovs,
             max_width: tests.max_width,
             materials: materials.len(),
         };
@@ -156,7 +149,6 @@ impl Plan {
             lines,
             layout,
             layers: layers.to_vec(),
-            aovs,
             filter: Filter::new(settings.filter, settings.filter_radius),
             explanation: String::new(),
         };

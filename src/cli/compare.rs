@@ -2,27 +2,25 @@
 
 use super::args::CompareArguments;
 use super::{Failure, print};
-use crate::film::compare::{self, Comparison};
+use crate::diag::Diagnostic;
+use crate::film::compare::{Comparison, compare};
 
 pub(super) fn run(arguments: &CompareArguments) -> Result<(), Failure> {
-    let comparison = compare::compare_files(&arguments.expected, &arguments.actual)?;
-    let Comparison { rmse, psnr, largest, differing_share, .. } = comparison;
+    let comparison = compare(&arguments.expected, &arguments.actual)?;
     if arguments.json {
-        // JSON has no infinity: equal pictures have no PSNR.
-        let finite = |x: f64| x.is_finite().then_some(x);
-        let figures = serde_json::json!({
-            "rmse": finite(rmse),
-            "psnr": finite(psnr),
-            "largest": finite(largest),
-            "differing_share": differing_share,
-        });
-        print(&format!("{figures:#}\n"))?;
+        let figures = serde_json::to_string_pretty(&comparison)
+            .map_err(|error| Diagnostic::error(format!("cannot write the figures: {error}")))?;
+        print(&(figures + "\n"))?;
     } else {
+        let Comparison { rmse, psnr, largest, largest_at, differing_share, .. } = &comparison;
+        let place = largest_at.as_ref().map_or_else(String::new, |at| format!(" ({} at {}, {})", at.channel, at.x, at.y));
         print(&format!(
-            "root mean square error   {rmse:.6}\npeak signal to noise     {psnr:.2} dB\nlargest difference       \
-             {largest:.6}\npixels that differ       {:.4} %\n",
+            "root mean square error  {rmse:.6}\n\
+             peak signal to noise    {psnr:.2} dB\n\
+             largest difference      {largest:.6}{place}\n\
+             pixels that differ      {:.4} %\n",
             differing_share * 100.0
         ))?;
     }
-    if largest <= arguments.tolerance { Ok(()) } else { Err(Failure::Silent) }
+    if comparison.largest <= arguments.tolerance { Ok(()) } else { Err(Failure::Silent) }
 }

@@ -9,10 +9,8 @@ use super::args::RenderArguments;
 use super::request::{Request, output_paths};
 use super::{Failure, terminal};
 use crate::diag::{Diagnostic, Diagnostics};
-use crate::film::{FilmTile, Layer, Output, OutputSettings};
-use crate::render::{Control, RenderOptions, Report, render};
+use crate::render::{Control, RenderOptions, Report, render_files};
 use crate::sample::PixelRect;
-use crate::scene::settings::Background;
 
 pub(super) fn run(arguments: &RenderArguments) -> Result<(), Failure> {
     let outputs = output_paths(&arguments.scene)?;
@@ -64,8 +62,6 @@ fn render_frame(
             size[0], size[1]
         )));
     }
-    let mut files = open(&request, crop)?;
-
     let quiet = arguments.scene.quiet;
     let label = frame.map_or_else(String::new, |frame| format!("frame {frame}"));
     let progress = terminal::Progress::new(!quiet, label);
@@ -77,50 +73,13 @@ fn render_frame(
     };
     let advance = |share| progress.set(share);
     let control = Control { cancel: Some(cancel), progress: Some(&advance) };
-    let plan = &request.plan;
-    let result = render(&request.scene, &request.shaders, plan, &options, &control, &mut |tile| {
-        files.iter_mut().try_for_each(|(output, channels)| output.write(&pick(tile, channels)))
-    });
+    let Request { scene, shaders, plan, files, load_seconds } = &request;
+    let result = render_files(scene, shaders, plan, files, &options, &control);
     progress.done();
     let mut report = result?;
-    let film = Instant::now();
-    for (output, _) in files {
-        output.finish()?;
-    }
-    report.stats.seconds.film += film.elapsed().as_secs_f64();
-    report.stats.seconds.load = request.load_seconds;
+    report.stats.seconds.load = *load_seconds;
     report.stats.seconds.total = start.elapsed().as_secs_f64();
     conclude(arguments, &request, report)
-}
-
-/// Opens all outputs; each goes with the places of its channels in the plan's tiles.
-fn open(request: &Request, crop: PixelRect) -> Result<Vec<(Output, Vec<usize>)>, Diagnostic> {
-    let scene = &request.scene;
-    let channels_of = |layer: &Layer| {
-        let before = request.plan.layers.iter().take_while(|known| *known != layer);
-        let first: usize = before.map(|known| known.channels().len()).sum();
-        first..first + layer.channels().len()
-    };
-    request
-        .outputs
-        .iter()
-        .map(|(path, layers)| {
-            let output = Output::create(OutputSettings {
-                path: path.clone(),
-                size: scene.render().size,
-                crop,
-                layers: layers.clone(),
-                transparent: scene.render().background == Background::Transparent,
-                metadata: Vec::new(),
-            })?;
-            Ok((output, layers.iter().flat_map(channels_of).collect()))
-        })
-        .collect()
-}
-
-/// The tile with some of its channels only.
-fn pick(tile: &FilmTile, channels: &[usize]) -> FilmTile {
-    FilmTile { rect: tile.rect, channels: channels.iter().map(|channel| tile.channels[*channel].clone()).collect() }
 }
 
 /// Says what happened, writes `--stats`, and decides about success.
@@ -131,8 +90,8 @@ fn conclude(arguments: &RenderArguments, request: &Request, report: Report) -> R
     }
     if !quiet {
         terminal::say(&report.warnings);
-        for (path, _) in &request.outputs {
-            terminal::note(&format!("wrote {} ({:.1} s)", path.display(), report.stats.seconds.total));
+        for file in &request.files {
+            terminal::note(&format!("wrote {} ({:.1} s)", file.path.display(), report.stats.seconds.total));
         }
     }
     let failed = report.script_errors.has_errors();

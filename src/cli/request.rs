@@ -5,10 +5,11 @@ use std::time::Instant;
 
 use super::args::{LineMode, SceneArguments};
 use super::{Failure, terminal};
-use crate::diag::{Diagnostic, Diagnostics, nearest};
+use crate::diag::{Diagnostic, Diagnostics};
 use crate::files::FileStore;
 use crate::film::Layer;
 use crate::plan::Plan;
+use crate::render::{PictureFile, layers_of};
 use crate::scene::{Scene, SceneBuilder, file};
 use crate::shade::{Host, OutputSet, Shaders};
 
@@ -17,8 +18,8 @@ pub(super) struct Request {
     pub scene: Scene,
     pub shaders: Shaders,
     pub plan: Plan,
-    /// Where to write, and which layers.
-    pub outputs: Vec<(PathBuf, Vec<Layer>)>,
+    /// The pictures to write.
+    pub files: Vec<PictureFile>,
     /// Seconds spent on getting here.
     pub load_seconds: f64,
 }
@@ -35,15 +36,12 @@ impl Request {
         if !arguments.quiet {
             terminal::say(&warnings);
         }
-        let outputs = outputs
+        let files = outputs
             .iter()
-            .map(|path| Ok((path.clone(), layers_of(path, &arguments.layer, &shaders)?)))
+            .map(|path| Ok(PictureFile { path: path.clone(), layers: layers_for(path, &arguments.layer, &shaders)? }))
             .collect::<Result<Vec<_>, Diagnostic>>()?;
-        let mut layers: Vec<Layer> = outputs.iter().flat_map(|(_, layers)| layers.clone()).collect();
-        layers.sort();
-        layers.dedup();
-        let plan = Plan::new(&scene, &shaders, &layers);
-        Ok(Self { scene, shaders, plan, outputs, load_seconds: start.elapsed().as_secs_f64() })
+        let plan = Plan::new(&scene, &shaders, &layers_of(&files));
+        Ok(Self { scene, shaders, plan, files, load_seconds: start.elapsed().as_secs_f64() })
     }
 }
 
@@ -91,12 +89,12 @@ fn load(
 }
 
 /// The layers of an output: those asked for, or a PNG's `rgba` and everything but `line.TYPE` for an EXR.
-fn layers_of(path: &Path, asked: &[String], shaders: &Shaders) -> Result<Vec<Layer>, Diagnostic> {
+fn layers_for(path: &Path, asked: &[String], shaders: &Shaders) -> Result<Vec<Layer>, Diagnostic> {
     let is_exr = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("exr"));
     let aovs = shaders.aovs();
     if !asked.is_empty() {
         let shown = if is_exr { asked } else { &asked[..1] };
-        return shown.iter().map(|name| named_layer(name, aovs)).collect();
+        return shown.iter().map(|name| Layer::parse(name, aovs)).collect();
     }
     if !is_exr {
         return Ok(vec![Layer::Rgba]);
@@ -116,19 +114,4 @@ fn layers_of(path: &Path, asked: &[String], shaders: &Shaders) -> Result<Vec<Lay
     }
     layers.extend(aovs.iter().enumerate().map(|(index, name)| Layer::Aov(index, name.clone())));
     Ok(layers)
-}
-
-fn named_layer(name: &str, aovs: &[String]) -> Result<Layer, Diagnostic> {
-    if let Some(aov) = name.strip_prefix("aov_") {
-        return aovs.iter().position(|known| known == aov).map(|index| Layer::Aov(index, aov.to_owned())).ok_or_else(
-            || {
-                let fault = Diagnostic::error(format!("no shader of this scene writes `{name}`"));
-                match nearest(aov, aovs.iter().map(String::as_str)) {
-                    Some(near) => fault.hint(format!("did you mean `aov_{near}`?")),
-                    None => fault,
-                }
-            },
-        );
-    }
-    name.parse()
 }

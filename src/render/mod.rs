@@ -5,8 +5,11 @@
 //! independent of each other and run on all threads. Strips that nothing needs any more are dropped: no sample is
 //! rendered twice, and memory grows with the short side of the picture only.
 
+mod files;
 mod grid;
 pub mod stats;
+
+pub use files::{PictureFile, layers_of, render_files};
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
@@ -68,8 +71,10 @@ pub struct Report {
     pub complete: bool,
 }
 
-/// Renders a scene under its plan. Finished tiles of the plan's layers go to `emit`, one at a time and always in the
-/// same order.
+/// Takes finished tiles of the plan's layers: called from any thread, in any order, each pixel once.
+pub type Emit<'a> = &'a (dyn Fn(&FilmTile) -> Result<(), Diagnostic> + Sync);
+
+/// Renders a scene under its plan. Finished tiles of the plan's layers go to `emit`.
 ///
 /// # Errors
 /// What `emit` returns, or that no threads could be started.
@@ -79,7 +84,7 @@ pub fn render(
     plan: &Plan,
     options: &RenderOptions,
     control: &Control<'_>,
-    emit: &mut (dyn FnMut(&FilmTile) -> Result<(), Diagnostic> + Send),
+    emit: Emit<'_>,
 ) -> Result<Report, Diagnostic> {
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(options.threads)
@@ -144,7 +149,7 @@ enum Job {
 enum Product {
     Sampled { tile: usize, traced: Box<TracedTile>, bounds: Option<TileBounds>, line_seconds: f64 },
     Lined { tile: usize, lines: Box<LineBuffer>, seconds: f64 },
-    Developed { film: FilmTile, seconds: f64 },
+    Developed { seconds: f64 },
 }
 
 #[derive(Default)]
@@ -198,7 +203,7 @@ impl<'a> Render<'a> {
     }
 
     /// The loop: every step moves each stage on by one strip.
-    fn run(&mut self, emit: &mut (dyn FnMut(&FilmTile) -> Result<(), Diagnostic> + Send)) -> Result<(), Diagnostic> {
+    fn run(&mut self, emit: Emit<'_>) -> Result<(), Diagnostic> {
         let strips_of = |pixels: i32| (pixels.max(0) as usize).div_ceil(self.grid.tile as usize);
         let line_halo = self.plan.lines.as_ref().map_or(0, |lines| strips_of(lines.reach));
         let film_halo = strips_of(self.plan.filter.reach());
@@ -211,10 +216,10 @@ impl<'a> Render<'a> {
                 jobs.extend(strip(line_lag).into_iter().map(Job::Line));
             }
             jobs.extend(strip(film_lag).into_iter().map(Job::Develop));
-            let products: Vec<Option<Product>> = jobs.into_par_iter().map(|job| self.work(job)).collect();
+            let products = jobs.into_par_iter().map(|job| self.work(job, emit)).collect::<Result<Vec<_>, _>>()?;
             for product in products {
                 match product {
-                    Some(product) => self.take(product, emit)?,
+                    Some(product) => self.take(product),
                     None => self.complete = false,
                 }
             }
@@ -238,9 +243,9 @@ impl<'a> Render<'a> {
     }
 
     /// Does a job, on any thread; `None` once cancelled.
-    fn work(&self, job: Job) -> Option<Product> {
+    fn work(&self, job: Job, emit: Emit<'_>) -> Result<Option<Product>, Diagnostic> {
         if self.cancelled() {
-            return None;
+            return Ok(None);
         }
         let start = Instant::now();
         let product = match job {
@@ -251,7 +256,10 @@ impl<'a> Render<'a> {
             }),
             Job::Develop(tile) => {
                 let film = self.develop(tile);
-                Some(Product::Developed { film, seconds: start.elapsed().as_secs_f64() })
+                if film.rect.pixels() > 0 {
+                    emit(&film)?;
+                }
+                Some(Product::Developed { seconds: start.elapsed().as_secs_f64() })
             }
         };
         let done = self.jobs_done.fetch_add(1, Ordering::Relaxed) + 1;
@@ -259,7 +267,7 @@ impl<'a> Render<'a> {
             let stages = if self.plan.lines.is_some() { 3 } else { 2 };
             progress(done as f64 / (stages * self.grid.tiles()) as f64);
         }
-        product
+        Ok(product)
     }
 
     fn sample(&self, tile: usize) -> Product {
@@ -294,11 +302,7 @@ impl<'a> Render<'a> {
     }
 
     /// Puts a job's product in its place.
-    fn take(
-        &mut self,
-        product: Product,
-        emit: &mut (dyn FnMut(&FilmTile) -> Result<(), Diagnostic> + Send),
-    ) -> Result<(), Diagnostic> {
+    fn take(&mut self, product: Product) {
         let totals = &mut self.totals;
         match product {
             Product::Sampled { tile, traced, bounds, line_seconds } => {
@@ -320,15 +324,8 @@ impl<'a> Render<'a> {
                 totals.lines += lines.counts;
                 self.lines[tile] = Some(lines);
             }
-            Product::Developed { film, seconds } => {
-                let start = Instant::now();
-                if film.rect.pixels() > 0 {
-                    emit(&film)?;
-                }
-                totals.seconds.film += seconds + start.elapsed().as_secs_f64();
-            }
+            Product::Developed { seconds } => totals.seconds.film += seconds,
         }
-        Ok(())
     }
 
     fn report(self) -> Report {

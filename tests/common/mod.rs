@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
+use std::sync::Mutex;
 
 use tusche::diag::Diagnostics;
 use tusche::files::FileStore;
@@ -62,8 +63,10 @@ pub fn render_with(scene: &Scene, layers: &[Layer], options: &RenderOptions) -> 
     let plan = Plan::new(scene, &shaders, layers);
     let [width, height] = scene.render().size.map(|n| n as usize);
     let count: usize = layers.iter().map(|layer| layer.channels().len()).sum();
-    let mut picture = Picture { width, height, channels: vec![vec![0.0; width * height]; count] };
-    let mut emit = |tile: &FilmTile| {
+    let picture = Picture { width, height, channels: vec![vec![0.0; width * height]; count] };
+    let picture = Mutex::new(picture);
+    let emit = |tile: &FilmTile| {
+        let mut picture = picture.lock().expect("no thread panics with it");
         for (channel, values) in picture.channels.iter_mut().zip(&tile.channels) {
             for (row, line) in values.chunks_exact(tile.rect.width() as usize).enumerate() {
                 let first = (tile.rect.y0 as usize + row) * width + tile.rect.x0 as usize;
@@ -72,9 +75,9 @@ pub fn render_with(scene: &Scene, layers: &[Layer], options: &RenderOptions) -> 
         }
         Ok(())
     };
-    let report = render(scene, &shaders, &plan, options, &Control::default(), &mut emit)
+    let report = render(scene, &shaders, &plan, options, &Control::default(), &emit)
         .unwrap_or_else(|fault| panic!("{fault}"));
-    (picture, report)
+    (picture.into_inner().expect("no thread panics with it"), report)
 }
 
 /// Renders a scene file's text with default options.
