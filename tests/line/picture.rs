@@ -82,7 +82,8 @@ impl Tiles {
     }
 }
 
-/// The area that lines cover in square pixels, by the mean of their alpha over the samples.
+/// The area that lines cover in a rectangle, in square pixels: the mean of their alpha over the samples. Samples are
+/// taken beyond it too, so its border does not matter.
 pub fn covered_area(
     rect: PixelRect,
     settings: &LineSettings,
@@ -90,9 +91,17 @@ pub fn covered_area(
     node: &dyn Fn([f32; 2]) -> Node,
 ) -> f64 {
     let rules = Rules::new(settings, samples_per_pixel);
-    let tiles =
-        Tiles::new(rect, 32, &rules, |tile| sampled(tile, &layout(samples_per_pixel, settings.max_width), node));
-    let alpha: f64 =
-        tiles.lines(Method::Exact).iter().flat_map(|lines| &lines.lines).map(|line| f64::from(line.alpha)).sum();
+    let layout = layout(samples_per_pixel, settings.max_width);
+    let sampled_rect = rect.grown(rules.reach());
+    let tiles = Tiles::new(sampled_rect, 32, &rules, |tile| sampled(tile, &layout, node));
+    let mut alpha = 0.0;
+    for ((buffer, _), lines) in tiles.tiles.iter().zip(tiles.lines(Method::Exact)) {
+        for (&sample, line) in lines.samples.iter().zip(&lines.lines) {
+            let [x, y] = buffer.pixel_of(sample);
+            if rect.contains(x, y) {
+                alpha += f64::from(line.alpha);
+            }
+        }
+    }
     alpha / f64::from(samples_per_pixel)
 }
