@@ -86,3 +86,15 @@ impl Texture {
         todo!()
     }
 }
+
+/// Decodes an image file.
+///
+/// # Errors
+/// If it is no image.
+pub fn decode(path: &std::path::Path, bytes: &[u8], srgb: bool) -> Result<Image, crate::diag::Diagnostic> {
+    let image = image::load_from_memory(bytes)
+        .map_err(|e| crate::diag::Diagnostic::error(format!("not an image: {e}")).in_file(path))?;
+    let rgba = image.to_rgba8();
+    let data = rgba.pixels().map(|p| p.0).collect();
+    Ok(Image { width: rgba.width(), height: rgba.height(), pixels: Pixels::Rgba8 { data, srgb } })
+}

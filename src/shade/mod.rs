@@ -11,6 +11,7 @@
 pub mod analysis;
 pub mod batch;
 pub mod bsdf;
+pub mod builtin;
 pub mod host;
 pub mod interpret;
 pub mod library;

@@ -1,1 +1,73 @@
-//! TODO
+//! Scene files: TOML in, a filled [`SceneBuilder`] out.
+//!
+//! 1. `document`: the text becomes a tree whose every key and value knows its place.
+//! 2. `overrides`: values of `--set` are put into the tree, with places of their own.
+//! 3. `check`: the tree is held against the JSON schema that is derived from the types of `format`; faulty parts are
+//!    reported and cut out.
+//! 4. `deserialize`: what is left becomes a typed value.
+//! 5. `resolve`: names, paths, units and defaults are resolved into the builder, with the tree at hand for places.
+//!
+//! No step stops at the first fault, nor does a fault stop the steps after it, syntax errors excepted: all that can be
+//! found is told in one go, in the order of the file.
+
+mod check;
+mod deserialize;
+mod document;
+mod expect;
+mod format;
+mod overrides;
+mod resolve;
+mod schema;
+
+use std::path::Path;
+
+use super::SceneBuilder;
+use crate::diag::Diagnostics;
+use crate::files::FileStore;
+
+pub use overrides::Override;
+pub use schema::schema;
+
+/// What the command line decides and loading needs to know.
+#[derive(Clone, Debug, Default)]
+pub struct LoadOptions {
+    /// Poses animated models at this frame, of which there are 24 a second. Default: time 0.
+    pub frame: Option<f64>,
+    /// The camera to render with, of the scene file or of one of its models. Default: the scene's first.
+    pub camera: Option<String>,
+}
+
+/// Reads a scene file, and everything that it names. Warnings come beside the value.
+///
+/// Relative paths are relative to the file, those in `overrides` to the working directory.
+///
+/// # Errors
+/// Everything that is wrong with the file, the overrides and the files it names, warnings included: errors of the
+/// scene file in its order, then those of the overrides, then those without a place.
+pub fn load(
+    path: &Path,
+    files: &FileStore,
+    overrides: &[Override],
+    options: &LoadOptions,
+) -> Result<(SceneBuilder, Diagnostics), Diagnostics> {
+    let source = files.read_text(path)?;
+    let mut document = document::parse(&source)?;
+    let mut faults = Diagnostics::default();
+    let schema = schema();
+    for change in overrides {
+        change.place(&mut document, &schema).unwrap_or_else(|fault| faults.push(fault));
+    }
+    check::check(&mut document, &schema, &mut faults);
+    let written = deserialize::from_node(&document).map_err(|fault| {
+        faults.push(fault);
+        std::mem::take(&mut faults)
+    })?;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let context = resolve::Context { files, options, source: &source, folder };
+    let builder = resolve::resolve(&written, &document, context, &mut faults);
+    faults.0.sort_by_key(|fault| match &fault.span {
+        Some(span) => (span.source != source, span.range.start),
+        None => (true, usize::MAX),
+    });
+    if faults.has_errors() { Err(faults) } else { Ok((builder, faults)) }
+}
