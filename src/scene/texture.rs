@@ -83,7 +83,7 @@ impl Texture {
     /// stub
     #[must_use]
     pub fn sample(&self, _uv: crate::math::Vec2) -> crate::math::Vec4 {
-        todo!()
+        crate::math::Vec4::ONE
     }
 }
 

@@ -2,7 +2,11 @@
 //!
 //! TODO by its owner: an abstract interpretation of `surface` with the material's parameters as constants.
 
+use std::sync::Arc;
+
 use super::names::{InputSet, OutputSet};
+use super::params::Params;
+use crate::scene::texture::Texture;
 
 /// What is known of one output.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -46,4 +50,23 @@ impl Analysis {
     pub fn is_constant(&self) -> bool {
         self.complete && self.inputs.is_empty()
     }
+}
+
+/// Nothing is known: everything is read, and every output may be written.
+#[must_use]
+pub fn unknown() -> Analysis {
+    let fact = OutputFact { may: true, always: false, inputs: InputSet::all(), range: None };
+    Analysis {
+        inputs: InputSet::all(),
+        outputs: OutputSet::all().iter().map(|_| fact.clone()).collect(),
+        aovs: Vec::new(),
+        complete: false,
+    }
+}
+
+/// Analyses a script with the parameters of one material.
+#[must_use]
+pub fn analyse(ast: &rhai::AST, params: &Params, textures: &[Arc<Texture>]) -> Analysis {
+    let _ = (ast, params, textures);
+    unknown()
 }
