@@ -14,6 +14,7 @@ pub mod host;
 pub mod interpret;
 pub mod library;
 pub mod names;
+pub mod params;
 pub mod program;
 
 pub use analysis::Analysis;
@@ -21,4 +22,5 @@ pub use batch::{HitBatch, LightSample, OutputBatch};
 pub use host::Host;
 pub use interpret::{ShadeErrors, Shading};
 pub use names::{InputSet, OutputSet, PathKind};
+pub use params::{Params, Value};
 pub use program::{Mode, Shader, Shaders};
