@@ -17,6 +17,7 @@ use tusche::shade::{Params, Value};
 fn analysis(script: &str, params: &[(&str, Value)]) -> Analysis {
     let mut engine = rhai::Engine::new_raw();
     engine.set_optimization_level(rhai::OptimizationLevel::None);
+    engine.set_max_expr_depths(0, 0);
     let ast = engine.compile(script).unwrap_or_else(|error| panic!("{error}\n{script}"));
     let params: BTreeMap<String, Value> = params.iter().map(|(key, value)| ((*key).to_owned(), value.clone())).collect();
     analyse(&ast, &Params(Arc::new(params)), &[texture([51, 102, 0, 255], [102, 204, 0, 255])])
