@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::ids::TextureId;
-use crate::math::Affine2;
+use crate::math::{Affine2, Vec2, Vec4};
 
 /// What happens outside 0 … 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -80,6 +80,7 @@ pub struct TextureRef {
 }
 
 impl Texture {
+<<<<<<< HEAD
     /// Least and greatest linear value of each channel.
     #[must_use]
     pub fn range(&self) -> ([f32; 4], [f32; 4]) {
@@ -102,5 +103,15 @@ impl Texture {
             Pixels::Rgba32F { data } => data.iter().for_each(|pixel| include(*pixel)),
         }
         (low, high)
+=======
+    /// The pixel values at a place, filtered, linear.
+    #[must_use]
+    pub fn sample(&self, uv: Vec2) -> Vec4 {
+        let _ = uv;
+        match &self.image.pixels {
+            Pixels::Rgba8 { data, .. } => Vec4::from(data[0].map(|c| f32::from(c) / 255.0)),
+            Pixels::Rgba32F { data } => Vec4::from(data[0]),
+        }
+>>>>>>> 9742f65
     }
 }

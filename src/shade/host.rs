@@ -1,11 +1,43 @@
-//! The host: what scripts may call.
+//! The host: what scripts may call, and the limits within which they run.
+//!
+//! Engines are built from nothing rather than from Rhai's standard set, so that every function in reach is here on
+//! purpose: no files, clock, sleep or output, and no function of the C library, whose results differ between machines.
 
+use std::collections::BTreeSet;
+use std::fmt;
 use std::sync::Arc;
+
+use rhai::packages::{
+    ArithmeticPackage, BasicArrayPackage, BasicIteratorPackage, BasicMapPackage, BasicStringPackage, LogicPackage,
+    Package,
+};
+use rhai::{Engine, LexError, OptimizationLevel, Token};
+
+use super::library;
+
+/// Operations of one call of `surface` or `params`: enough for thousands of noise lookups, and a fraction of a second.
+pub(super) const MAX_OPERATIONS: u64 = 500_000;
+/// Calls inside calls; as much as fits the stack of a render thread.
+pub(super) const MAX_CALL_DEPTH: usize = 32;
+/// Brackets inside brackets in the script's text.
+pub(super) const MAX_EXPRESSION_DEPTH: usize = 48;
+/// Bytes of a text.
+pub(super) const MAX_TEXT: usize = 4096;
+/// Elements of an array, with those of arrays in it.
+pub(super) const MAX_ARRAY: usize = 1024;
+/// Entries of a record, with those of records in it.
+pub(super) const MAX_MAP: usize = 256;
 
 /// The library of functions that scripts see: Tusche's own, and what a Rust user registers (DESIGN section 4.5).
 #[derive(Clone, Default)]
 pub struct Host {
     packages: Vec<Arc<dyn Fn(&mut rhai::Engine) + Send + Sync>>,
+}
+
+impl fmt::Debug for Host {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Host").field("packages", &self.packages.len()).finish()
+    }
 }
 
 impl Host {
@@ -15,10 +47,67 @@ impl Host {
         Self::default()
     }
 
-    /// The same host with more functions: `register` is called on every engine that is made (one per thread).
+    /// The same host with more functions: `register` is called on every engine that is made (one per thread). The
+    /// limits and the sandbox are set afterwards, so it cannot loosen them.
     #[must_use]
     pub fn with(mut self, register: impl Fn(&mut rhai::Engine) + Send + Sync + 'static) -> Self {
         self.packages.push(Arc::new(register));
         self
     }
+
+    /// A new engine. `parameters` are the names that scripts may ask of `p`.
+    pub(super) fn engine(&self, parameters: &BTreeSet<String>) -> Engine {
+        let mut engine = Engine::new_raw();
+        ArithmeticPackage::new().register_into_engine(&mut engine);
+        LogicPackage::new().register_into_engine(&mut engine);
+        BasicIteratorPackage::new().register_into_engine(&mut engine);
+        BasicStringPackage::new().register_into_engine(&mut engine);
+        BasicArrayPackage::new().register_into_engine(&mut engine);
+        BasicMapPackage::new().register_into_engine(&mut engine);
+        library::register(&mut engine, parameters);
+        for register in &self.packages {
+            register(&mut engine);
+        }
+        confine(&mut engine);
+        engine
+    }
+}
+
+fn confine(engine: &mut Engine) {
+    engine
+        .set_max_operations(MAX_OPERATIONS)
+        .set_max_call_levels(MAX_CALL_DEPTH)
+        .set_max_expr_depths(MAX_EXPRESSION_DEPTH, MAX_EXPRESSION_DEPTH)
+        .set_max_string_size(MAX_TEXT)
+        .set_max_array_size(MAX_ARRAY)
+        .set_max_map_size(MAX_MAP)
+        .set_max_modules(0)
+        // Rhai compares floats with a tolerance and takes powers from the C library unless its built-in operators
+        // can be overridden, which this allows.
+        .set_fast_operators(false)
+        // The tree stays as written: positions are exact, and the analysis and the kernels see what the user sees.
+        .set_optimization_level(OptimizationLevel::None)
+        .set_strict_variables(true)
+        .set_fail_on_invalid_map_property(true)
+        // A closure can hold a closure can hold a …, without a bound on the depth.
+        .set_allow_anonymous_fn(false)
+        .on_print(|_| {})
+        .on_debug(|_, _, _| {});
+    #[allow(deprecated, reason = "marked so only because it may change; the version of rhai is pinned")]
+    engine.on_parse_token(|token, _, _| refuse(token));
+}
+
+/// Replaces tokens that have no place in a shader by errors that say so.
+fn refuse(token: Token) -> Token {
+    let told = match &token {
+        Token::Import | Token::Export => "modules are not available in shaders: put the functions into this file",
+        Token::Identifier(name) | Token::Reserved(name) => match name.as_str() {
+            "eval" => "`eval` is not available in shaders: what a script does must be known from its text",
+            "Fn" | "call" | "curry" => "function pointers are not available in shaders: call the function by its name",
+            _ => return token,
+        },
+        _ => return token,
+    };
+    let symbol = token.to_string();
+    Token::LexError(LexError::ImproperSymbol(symbol, told.to_owned()).into())
 }

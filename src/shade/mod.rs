@@ -10,12 +10,16 @@
 
 pub mod analysis;
 pub mod batch;
+pub mod builtin;
+mod fault;
 pub mod host;
 pub mod interpret;
 pub mod library;
 pub mod names;
+mod output;
 pub mod params;
 pub mod program;
+mod script;
 
 pub use analysis::Analysis;
 pub use batch::{HitBatch, LightSample, OutputBatch};

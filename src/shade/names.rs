@@ -16,9 +16,10 @@ bitflags! {
         const INCOMING = 1 << 3;
         /// `uv`: texture coordinates, set 0.
         const UV = 1 << 4;
-        /// `tangent`: unit tangent along u, world space.
+        /// `tangent`: xyz is the unit tangent along u, world space; w is the sign (1 or -1) such that
+        /// `cross(normal, tangent.xyz) * tangent.w` is the tangent along v, on the front of the surface.
         const TANGENT = 1 << 5;
-        /// `color`: linear vertex colour.
+        /// `color`: linear vertex colour with alpha; (1, 1, 1, 1) where the mesh has none.
         const COLOR = 1 << 6;
         /// `object_id`: integer, from 1.
         const OBJECT_ID = 1 << 7;
@@ -44,7 +45,8 @@ bitflags! {
         const PIXELS_PER_UNIT = 1 << 17;
         /// `curvature`: mean curvature from the normals of the triangle, 1 / world units, positive where convex.
         const CURVATURE = 1 << 18;
-        /// `irradiance`: sum of the lights' contributions on this side, shadows included, linear RGB.
+        /// `irradiance`: sum of the lights' contributions on this side, shadows included, linear RGB: over all lights in
+        /// order, radiance · visibility · max(0, normal · direction). Needs the columns of `light` and `normal`.
         const IRRADIANCE = 1 << 19;
         /// `light_count`: integer.
         const LIGHT_COUNT = 1 << 20;
@@ -55,9 +57,52 @@ bitflags! {
     }
 }
 
+/// What scripts read on `hit`, with its spelling, in the order of the bits. `MORE_UVS` is no property: `texture` reads it.
+const INPUT_NAMES: [(&str, InputSet); 22] = [
+    ("position", InputSet::POSITION),
+    ("normal", InputSet::NORMAL),
+    ("geometric_normal", InputSet::GEOMETRIC_NORMAL),
+    ("incoming", InputSet::INCOMING),
+    ("uv", InputSet::UV),
+    ("tangent", InputSet::TANGENT),
+    ("color", InputSet::COLOR),
+    ("object_id", InputSet::OBJECT_ID),
+    ("shader_id", InputSet::SHADER_ID),
+    ("polygon_id", InputSet::POLYGON_ID),
+    ("material_id", InputSet::MATERIAL_ID),
+    ("barycentric", InputSet::BARYCENTRIC),
+    ("distance", InputSet::DISTANCE),
+    ("depth", InputSet::DEPTH),
+    ("path_kind", InputSet::PATH_KIND),
+    ("front_facing", InputSet::FRONT_FACING),
+    ("time", InputSet::TIME),
+    ("pixels_per_unit", InputSet::PIXELS_PER_UNIT),
+    ("curvature", InputSet::CURVATURE),
+    ("irradiance", InputSet::IRRADIANCE),
+    ("light_count", InputSet::LIGHT_COUNT),
+    ("light", InputSet::LIGHT),
+];
+
 impl InputSet {
     /// The inputs that need light samples (and with them shadow rays).
     pub const LIGHTS: Self = Self::IRRADIANCE.union(Self::LIGHT);
+
+    /// Every input that has a name on `hit`, with that name, in the order of the bits.
+    pub fn named() -> impl Iterator<Item = (&'static str, Self)> {
+        INPUT_NAMES.into_iter()
+    }
+
+    /// The input of a name.
+    #[must_use]
+    pub fn spelled(name: &str) -> Option<Self> {
+        INPUT_NAMES.into_iter().find(|(known, _)| *known == name).map(|(_, input)| input)
+    }
+
+    /// The columns of a batch that these inputs are computed from.
+    #[must_use]
+    pub fn columns(self) -> Self {
+        if self.contains(Self::IRRADIANCE) { self | Self::LIGHT | Self::NORMAL } else { self }
+    }
 }
 
 bitflags! {
@@ -97,7 +142,40 @@ bitflags! {
     }
 }
 
+/// The keys of the record, in the order of the bits.
+const OUTPUT_NAMES: [(&str, OutputSet); 15] = [
+    ("base_color", OutputSet::BASE_COLOR),
+    ("metallic", OutputSet::METALLIC),
+    ("roughness", OutputSet::ROUGHNESS),
+    ("specular", OutputSet::SPECULAR),
+    ("ior", OutputSet::IOR),
+    ("transmission", OutputSet::TRANSMISSION),
+    ("opacity", OutputSet::OPACITY),
+    ("emission", OutputSet::EMISSION),
+    ("normal", OutputSet::NORMAL),
+    ("occlusion", OutputSet::OCCLUSION),
+    ("feature", OutputSet::FEATURE),
+    ("line_color", OutputSet::LINE_COLOR),
+    ("line_width", OutputSet::LINE_WIDTH),
+    ("priority", OutputSet::PRIORITY),
+    ("color", OutputSet::COLOR),
+];
+
+/// What the key of an extra output starts with.
+pub const AOV_PREFIX: &str = "aov_";
+
 impl OutputSet {
+    /// Every output with its key, in the order of the bits.
+    pub fn named() -> impl Iterator<Item = (&'static str, Self)> {
+        OUTPUT_NAMES.into_iter()
+    }
+
+    /// The output of a key.
+    #[must_use]
+    pub fn spelled(name: &str) -> Option<Self> {
+        OUTPUT_NAMES.into_iter().find(|(known, _)| *known == name).map(|(_, output)| output)
+    }
+
     /// What the lighting of a hit needs.
     pub const BSDF: Self = Self::BASE_COLOR
         .union(Self::METALLIC)

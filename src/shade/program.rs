@@ -1,7 +1,16 @@
 //! Compiled scripts and the materials that use them.
 
-use super::analysis::Analysis;
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+use rhai::Engine;
+
+use super::analysis::{self, Analysis};
 use super::host::Host;
+use super::library::ParameterRecord;
+use super::names::InputSet;
+use super::params::{self, Params};
+use super::script::Program;
 use crate::diag::Diagnostics;
 use crate::scene::Scene;
 use crate::scene::ids::MaterialId;
@@ -29,31 +38,102 @@ impl Mode {
 /// A material's shader: a compiled script with this material's parameters.
 #[derive(Debug)]
 pub struct Shader {
+    name: String,
+    analysis: Analysis,
+    params: Params,
+    pub(super) program: Arc<Program>,
+    pub(super) record: ParameterRecord,
+}
+
+impl Shader {
     /// Name of the material.
-    pub name: String,
+    #[must_use]
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Name of the script, as messages call it.
+    #[must_use]
+    pub fn script(&self) -> &str {
+        &self.program.source.name
+    }
+
     /// What it reads and writes.
-    pub analysis: Analysis,
+    #[must_use]
+    pub fn analysis(&self) -> &Analysis {
+        &self.analysis
+    }
+
+    /// Its parameters.
+    #[must_use]
+    pub fn params(&self) -> &Params {
+        &self.params
+    }
+
     /// How it is run.
-    pub mode: Mode,
+    #[must_use]
+    pub fn mode(&self) -> Mode {
+        if self.analysis.is_constant() { Mode::Constant } else { Mode::Interpreted }
+    }
+
+    /// The columns of a [`HitBatch`](super::HitBatch) that must be filled for it.
+    #[must_use]
+    pub fn needs(&self) -> InputSet {
+        if self.analysis.complete { self.analysis.inputs.columns() } else { InputSet::all() }
+    }
 }
 
 /// The shaders of all materials of a scene.
 #[derive(Debug)]
 pub struct Shaders {
-    /// By material.
-    pub shaders: Vec<Shader>,
-    /// Names of all extra outputs of all shaders, without `aov_`, sorted.
-    pub aovs: Vec<String>,
+    shaders: Vec<Shader>,
+    aovs: Vec<String>,
+    host: Host,
+    /// Every name that some script's `params()` has.
+    parameters: BTreeSet<String>,
 }
 
 impl Shaders {
     /// Compiles and analyses all scripts of a scene. Warnings come beside the value.
     ///
     /// # Errors
-    /// Every syntax error, missing `surface`, unknown input or output, unknown or ill-typed parameter, at its place.
+    /// Every syntax error, missing `surface`, fault in `params()`, and unknown or ill-typed parameter, at its place.
     pub fn compile(scene: &Scene, host: &Host) -> Result<(Self, Diagnostics), Diagnostics> {
-        let _ = (scene, host);
-        todo!()
+        let engine = host.engine(&BTreeSet::new());
+        let mut faults = Diagnostics::default();
+        let mut keep = |result: Result<_, Diagnostics>| result.map_err(|found| faults.extend(found)).ok();
+
+        let scripts: Vec<_> = scene
+            .scripts()
+            .iter()
+            .map(|script| {
+                keep(Program::parse(&engine, &script.source).and_then(|program| {
+                    let defaults = params::defaults(&program, &program.defaults(&engine)?)?;
+                    Ok((Arc::new(program), defaults))
+                }))
+            })
+            .collect();
+
+        let mut shaders = Vec::new();
+        for material in scene.materials() {
+            let Some((program, defaults)) = &scripts[material.script.index()] else { continue };
+            match params::resolve(defaults.clone(), material, program) {
+                Ok(params) => shaders.push(Shader {
+                    name: material.name.clone(),
+                    analysis: analysis::analyse(&program.ast, &params, scene.textures()),
+                    record: ParameterRecord::new(&params, scene.textures()),
+                    params,
+                    program: Arc::clone(program),
+                }),
+                Err(found) => faults.extend(found),
+            }
+        }
+        if faults.has_errors() {
+            return Err(faults);
+        }
+        let parameters = scripts.iter().flatten().flat_map(|(_, defaults)| defaults.keys().cloned()).collect();
+        let aovs = extra_outputs(&shaders);
+        Ok((Self { shaders, aovs, host: host.clone(), parameters }, faults))
     }
 
     /// The shader of a material.
@@ -61,4 +141,33 @@ impl Shaders {
     pub fn of(&self, material: MaterialId) -> &Shader {
         &self.shaders[material.index()]
     }
+
+    /// The shaders by material.
+    #[must_use]
+    pub fn all(&self) -> &[Shader] {
+        &self.shaders
+    }
+
+    /// Names of all extra outputs of all shaders, without `aov_`, sorted.
+    #[must_use]
+    pub fn aovs(&self) -> &[String] {
+        &self.aovs
+    }
+
+    /// An engine for one thread: an engine shared by two would make them wait for each other.
+    pub(super) fn engine(&self) -> Engine {
+        self.host.engine(&self.parameters)
+    }
+}
+
+/// The names that the analysis knows, and where it is not complete, those written out in the script.
+fn extra_outputs(shaders: &[Shader]) -> Vec<String> {
+    let mut names = BTreeSet::new();
+    for shader in shaders {
+        names.extend(shader.analysis.aovs.iter().map(|(name, _)| name.clone()));
+        if !shader.analysis.complete {
+            names.extend(shader.program.written_aovs());
+        }
+    }
+    names.into_iter().collect()
 }

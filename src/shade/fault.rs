@@ -1,0 +1,227 @@
+//! What goes wrong in a script, as a [`Diagnostic`] with its place.
+//!
+//! Rhai's errors carry a position and a sentence made for programmers of a host; here they become sentences for the
+//! person who wrote the shader. Library functions raise a [`Fault`], which passes through the interpreter unchanged.
+
+use std::sync::Arc;
+
+use rhai::{Dynamic, EvalAltResult, LexError, ParseError, ParseErrorType, Position};
+
+use super::host::{MAX_ARRAY, MAX_CALL_DEPTH, MAX_EXPRESSION_DEPTH, MAX_MAP, MAX_OPERATIONS, MAX_TEXT};
+use super::library;
+use crate::diag::{Diagnostic, Source, Span, nearest};
+
+/// An error raised by a library function; the interpreter adds the place of the call.
+#[derive(Clone, Debug)]
+pub(super) struct Fault {
+    pub message: String,
+    pub hints: Vec<String>,
+}
+
+impl Fault {
+    pub fn new(message: impl Into<String>) -> Self {
+        Self { message: message.into(), hints: Vec::new() }
+    }
+
+    pub fn hint(mut self, hint: impl Into<String>) -> Self {
+        self.hints.push(hint.into());
+        self
+    }
+
+    /// The same, with the nearest of the names as a hint, or all of them if none is near.
+    pub fn propose<'a>(self, word: &str, names: impl Iterator<Item = &'a str> + Clone) -> Self {
+        match nearest(word, names.clone()) {
+            Some(near) => self.hint(format!("did you mean `{near}`?")),
+            None => {
+                let all: Vec<_> = names.collect();
+                if all.is_empty() { self } else { self.hint(format!("there are: {}", all.join(", "))) }
+            }
+        }
+    }
+
+    /// As a diagnostic at a place.
+    pub fn at(self, span: Span) -> Diagnostic {
+        self.hints.into_iter().fold(Diagnostic::error(self.message).at(span), Diagnostic::hint)
+    }
+}
+
+impl From<Fault> for Box<EvalAltResult> {
+    fn from(fault: Fault) -> Self {
+        Box::new(EvalAltResult::ErrorRuntime(Dynamic::from(fault), Position::NONE))
+    }
+}
+
+/// The span of a position; without one, the end of the text.
+pub(super) fn span(source: &Arc<Source>, position: Position) -> Span {
+    match position.line() {
+        Some(line) => Span::word_at(source, line, position.position().unwrap_or(1)),
+        None => Span::new(source, source.text.len()..source.text.len()),
+    }
+}
+
+/// An error of the parser.
+pub(super) fn from_parse_error(error: &ParseError, source: &Arc<Source>) -> Diagnostic {
+    use ParseErrorType as Kind;
+    let fault = match error.err_type() {
+        Kind::UnexpectedEOF => Fault::new("the script ends too early").hint("is a closing `}` or `)` missing?"),
+        Kind::BadInput(LexError::ImproperSymbol(_, told)) if !told.is_empty() => Fault::new(lower_first(told)),
+        Kind::VariableUndefined(name) => unknown_variable(name),
+        Kind::ModuleUndefined(name) => Fault::new(format!("there is no module `{name}`")),
+        Kind::ExprTooDeep => Fault::new(format!("this is nested more than {MAX_EXPRESSION_DEPTH} levels deep"))
+            .hint("give parts of it a name with `let`, or put them into functions"),
+        Kind::WrongFnDefinition => Fault::new("functions can only stand at the top level of the script"),
+        Kind::FnDuplicatedDefinition(name, count) => {
+            Fault::new(format!("there are two functions `{name}` with {count} parameters"))
+        }
+        Kind::MissingToken(token, place) => Fault::new(format!("expected `{token}` {place}")),
+        Kind::WrongDocComment => Fault::new("a `///` comment must be followed by a function")
+            .hint("write `//!` at the head of the file, and `//` elsewhere"),
+        other => Fault::new(lower_first(&other.to_string())),
+    };
+    fault.at(span(source, error.position()))
+}
+
+/// An error of a run, at its innermost place.
+pub(super) fn from_run(error: &EvalAltResult, source: &Arc<Source>, functions: &[(String, usize)]) -> Diagnostic {
+    let mut place = error.position();
+    let mut error = error;
+    let mut callers = Vec::new();
+    while let EvalAltResult::ErrorInFunctionCall(name, _, inner, call) = error {
+        callers.push((name.as_str(), *call));
+        error = inner;
+        if !inner.position().is_none() {
+            place = inner.position();
+        }
+    }
+    let mut fault = explain(error, functions);
+    for (name, call) in callers.iter().rev().filter(|(_, call)| !call.is_none()) {
+        let (line, column) = (call.line().unwrap_or(0), call.position().unwrap_or(0));
+        fault = fault.hint(format!("`{name}` was called at line {line}, column {column}"));
+    }
+    fault.at(span(source, place))
+}
+
+fn explain(error: &EvalAltResult, functions: &[(String, usize)]) -> Fault {
+    use EvalAltResult as Kind;
+    match error {
+        Kind::ErrorRuntime(token, _) => match token.read_lock::<Fault>() {
+            Some(fault) => fault.clone(),
+            None => Fault::new(format!("the script stopped itself: {token}")),
+        },
+        Kind::ErrorFunctionNotFound(signature, _) => unknown_function(signature, functions),
+        Kind::ErrorVariableNotFound(name, _) => unknown_variable(name),
+        Kind::ErrorPropertyNotFound(name, _) => Fault::new(format!("this record has no `{name}`")),
+        Kind::ErrorDotExpr(message, _) => unknown_property(message),
+        Kind::ErrorTooManyOperations(_) => {
+            Fault::new(format!("the script did not finish within {MAX_OPERATIONS} operations"))
+                .hint("is there a loop without an end?")
+        }
+        Kind::ErrorStackOverflow(_) => Fault::new(format!("functions call each other more than {MAX_CALL_DEPTH} deep"))
+            .hint("does a function call itself without an end?"),
+        Kind::ErrorDataTooLarge(what, _) if what.contains("string") => {
+            Fault::new(format!("a text may have at most {MAX_TEXT} bytes"))
+        }
+        Kind::ErrorDataTooLarge(what, _) if what.contains("map") => {
+            Fault::new(format!("a record may have at most {MAX_MAP} entries"))
+        }
+        Kind::ErrorDataTooLarge(..) => Fault::new(format!("an array may have at most {MAX_ARRAY} elements")),
+        Kind::ErrorArithmetic(message, _) => Fault::new(lower_first(message)),
+        Kind::ErrorArrayBounds(length, index, _) => {
+            Fault::new(format!("index {index} is out of range: the array has {length} elements"))
+                .hint("the first element is number 0")
+        }
+        Kind::ErrorIndexingType(types, _) => Fault::new(format!("this cannot be indexed: {types}")),
+        Kind::ErrorMismatchDataType(wanted, found, _) => {
+            Fault::new(format!("this must be {}, but it is {}", type_name(wanted), type_name(found)))
+        }
+        Kind::ErrorFor(_) => {
+            Fault::new("`for` cannot run over this").hint("it runs over ranges such as `0..4`, arrays and texts")
+        }
+        Kind::ErrorAssignmentToConstant(name, _) => Fault::new(format!("`{name}` is constant and cannot be changed")),
+        Kind::ErrorModuleNotFound(name, _) => Fault::new(format!("there is no module `{name}`")),
+        other => {
+            let mut text = other.to_string();
+            if let Some(end) = text.rfind(" (line ") {
+                text.truncate(end);
+            }
+            Fault::new(lower_first(&text))
+        }
+    }
+}
+
+fn unknown_variable(name: &str) -> Fault {
+    let fault = Fault::new(format!("there is no variable `{name}` here"));
+    match name {
+        "hit" | "p" => fault.hint(format!("a function sees only its own parameters: pass `{name}` on to it")),
+        _ => fault,
+    }
+}
+
+/// `signature` is as Rhai writes it: `name (type, type)`.
+fn unknown_function(signature: &str, functions: &[(String, usize)]) -> Fault {
+    let (name, types) = signature.split_once(" (").unwrap_or((signature, ")"));
+    let types: Vec<_> =
+        types.trim_end_matches(')').split(", ").filter(|name| !name.is_empty()).map(type_name).collect();
+    let is_operator = !name.starts_with(|c: char| c.is_alphabetic() || c == '_');
+    if is_operator {
+        return match types.as_slice() {
+            [left, right] => Fault::new(format!("`{name}` does not work between {left} and {right}")),
+            _ => Fault::new(format!("`{name}` does not work on {}", types.join(", "))),
+        };
+    }
+    let own: Vec<_> = functions.iter().filter(|(known, _)| known == name).collect();
+    let library: Vec<_> = library::functions().filter(|known| known.name == name).collect();
+    if own.is_empty() && library.is_empty() {
+        let names = functions.iter().map(|(name, _)| name.as_str()).chain(library::functions().map(|f| f.name));
+        let fault = Fault::new(format!("there is no function `{name}`"));
+        return match nearest(name, names) {
+            Some(near) => fault.hint(format!("did you mean `{near}`?")),
+            None => fault,
+        };
+    }
+    let mut fault = Fault::new(format!("`{name}` cannot be called with ({})", types.join(", ")));
+    for (_, count) in own {
+        fault = fault.hint(format!("the script's own `{name}` takes {count} parameters"));
+    }
+    for known in library {
+        fault = fault.hint(format!("it is called as `{}`: {}", known.form, known.about));
+    }
+    fault
+}
+
+/// `message` is Rhai's: `Unknown property 'x' - a getter is not registered for type 'y'`.
+fn unknown_property(message: &str) -> Fault {
+    let quoted: Vec<_> = message.split('\'').collect();
+    match quoted.as_slice() {
+        [_, property, verb, owner, ..] => {
+            let owner = type_name(owner);
+            if verb.contains("setter") {
+                Fault::new(format!("`{property}` of {owner} cannot be set"))
+            } else {
+                Fault::new(format!("{owner} has no `{property}`"))
+            }
+        }
+        _ => Fault::new(lower_first(message)),
+    }
+}
+
+/// How messages call a type, from Rhai's name for it.
+pub(super) fn type_name(rhai: &str) -> String {
+    match rhai {
+        "i64" => "int",
+        "f32" => "float",
+        "&str | ImmutableString | String" | "string" => "text",
+        "map" => "record",
+        "Fn" => "function",
+        other => other,
+    }
+    .to_owned()
+}
+
+fn lower_first(text: &str) -> String {
+    let mut letters = text.chars();
+    match letters.next() {
+        Some(first) => first.to_lowercase().chain(letters).collect(),
+        None => String::new(),
+    }
+}

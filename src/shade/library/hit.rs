@@ -1,0 +1,121 @@
+//! `hit`: the inputs of one hit, as scripts read them.
+
+use std::sync::Arc;
+
+use rhai::{Dynamic, Engine, ImmutableString};
+
+use super::Function;
+use super::math::max;
+use super::operand::Outcome;
+use super::vectors::dot;
+use crate::math::{Vec2, Vec3};
+use crate::shade::batch::{HitBatch, LightSample};
+use crate::shade::fault::Fault;
+use crate::shade::names::InputSet;
+
+pub(super) const FUNCTIONS: &[Function] = &[Function {
+    name: "light",
+    form: "hit.light(i)",
+    about: "light number 0 … hit.light_count − 1, with its direction, radiance and visibility",
+}];
+
+/// A row of a batch: the batch is shared, so that a hit costs one small allocation whatever it reads.
+#[derive(Clone, Debug)]
+pub(in crate::shade) struct Hit {
+    pub batch: Arc<HitBatch>,
+    pub row: usize,
+}
+
+/// What `hit.light(i)` gives.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Light(LightSample);
+
+impl Hit {
+    fn read<T: Copy>(&self, name: &str, column: &[T]) -> Outcome<T> {
+        column.get(self.row).copied().ok_or_else(|| unfilled(name))
+    }
+
+    fn lights(&self) -> Outcome<&[LightSample]> {
+        let count = self.batch.light_count;
+        self.batch.lights.get(self.row * count..(self.row + 1) * count).ok_or_else(|| unfilled("light"))
+    }
+
+    fn light(&self, index: i64) -> Outcome<Light> {
+        let lights = self.lights()?;
+        let light = usize::try_from(index).ok().and_then(|i| lights.get(i));
+        light.map(|light| Light(*light)).ok_or_else(|| {
+            let fault = Fault::new(format!("light {index} is out of range: the scene has {} lights", lights.len()));
+            fault.hint("count them with `for i in 0..hit.light_count`").into()
+        })
+    }
+
+    fn irradiance(&self) -> Outcome<Vec3> {
+        let normal = self.read("normal", &self.batch.normal)?;
+        Ok(self.lights()?.iter().fold(Vec3::ZERO, |sum, light| {
+            sum + light.radiance * light.visibility * max(0.0, dot(normal, light.direction))
+        }))
+    }
+
+    /// The texture coordinates of a set; (0, 0) where the mesh lacks the set.
+    pub(super) fn uv_set(&self, set: u32) -> Outcome<Vec2> {
+        match set.checked_sub(1) {
+            None => self.read("uv", &self.batch.uv),
+            Some(more) => match self.batch.more_uvs.get(more as usize) {
+                Some(column) => self.read("texture", column),
+                None => Ok(Vec2::ZERO),
+            },
+        }
+    }
+}
+
+/// A hit was asked for what its batch does not hold: the analysis missed that the script reads it.
+fn unfilled(name: &str) -> Box<rhai::EvalAltResult> {
+    Fault::new(format!("the input `{name}` was not prepared for this shader"))
+        .hint("this is a fault of Tusche, not of the script: please report it with the script")
+        .into()
+}
+
+fn unknown(name: &str) -> Fault {
+    let fault = Fault::new(format!("there is no input `{name}` on `hit`"));
+    fault.propose(name, InputSet::named().map(|(name, _)| name).collect::<Vec<_>>().into_iter())
+}
+
+pub(super) fn register(engine: &mut Engine) {
+    engine.register_type_with_name::<Hit>("hit");
+    macro_rules! columns {
+        ($($name:ident),*) => { $(
+            engine.register_get(stringify!($name), |hit: &mut Hit| hit.read(stringify!($name), &hit.batch.$name));
+        )* };
+    }
+    columns!(
+        position, normal, geometric_normal, incoming, uv, tangent, color, barycentric, distance, depth, front_facing,
+        pixels_per_unit, curvature
+    );
+    let id = |hit: &Hit, name: &str, column: &[u32]| hit.read(name, column).map(i64::from);
+    engine.register_get("object_id", move |hit: &mut Hit| id(hit, "object_id", &hit.batch.object_id));
+    engine.register_get("polygon_id", move |hit: &mut Hit| id(hit, "polygon_id", &hit.batch.polygon_id));
+    engine.register_get("shader_id", |hit: &mut Hit| i64::from(hit.batch.material_id));
+    engine.register_get("material_id", |hit: &mut Hit| i64::from(hit.batch.material_id));
+    engine.register_get("time", |hit: &mut Hit| hit.batch.time);
+    engine.register_get("light_count", |hit: &mut Hit| hit.batch.light_count as i64);
+    engine.register_get("irradiance", |hit: &mut Hit| hit.irradiance());
+    engine.register_get("path_kind", |hit: &mut Hit| -> Outcome<ImmutableString> {
+        hit.read("path_kind", &hit.batch.path_kind).map(|kind| kind.name().into())
+    });
+    engine.register_fn("light", |hit: &mut Hit, index: i64| hit.light(index));
+    engine.register_indexer_get(|_: &mut Hit, name: ImmutableString| -> Outcome { Err(unknown(&name).into()) });
+    engine.register_indexer_set(|_: &mut Hit, name: ImmutableString, _: Dynamic| -> Outcome<()> {
+        let known = InputSet::spelled(&name).is_some();
+        let fault = if known { Fault::new(format!("the input `{name}` cannot be changed")) } else { unknown(&name) };
+        Err(fault.into())
+    });
+
+    engine.register_type_with_name::<Light>("light");
+    engine.register_get("direction", |light: &mut Light| light.0.direction);
+    engine.register_get("radiance", |light: &mut Light| light.0.radiance);
+    engine.register_get("visibility", |light: &mut Light| light.0.visibility);
+    engine.register_indexer_get(|_: &mut Light, name: ImmutableString| -> Outcome {
+        let fault = Fault::new(format!("a light has no `{name}`"));
+        Err(fault.propose(&name, ["direction", "radiance", "visibility"].into_iter()).into())
+    });
+}

@@ -1,0 +1,71 @@
+//! The functions that scripts may call.
+//!
+//! Each file owns one subject: what it registers with the engine, and the list of its functions for messages and
+//! reference pages. What reaches a picture is computed by plain `f32` functions whose formulas, and the order of the
+//! operations in them, are part of the contract: a kernel that does the same steps gives the same bits.
+//!
+//! Wherever a number is expected, a script may write `1` or `1.0`; an int counts as the nearest float.
+
+mod color;
+mod compare;
+mod hash;
+mod hit;
+mod math;
+mod noise;
+mod operand;
+mod parameters;
+mod ramp;
+mod swizzle;
+mod texture;
+mod vectors;
+
+use std::collections::BTreeSet;
+
+use rhai::Engine;
+
+pub(super) use hit::Hit;
+pub(super) use operand::kind;
+pub(super) use parameters::ParameterRecord;
+
+/// A function of the library, for messages and reference pages.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Function {
+    /// Its name.
+    pub name: &'static str,
+    /// How it is called.
+    pub form: &'static str,
+    /// What it gives.
+    pub about: &'static str,
+}
+
+/// All functions of the library, by subject.
+pub fn functions() -> impl Iterator<Item = Function> + Clone {
+    [
+        vectors::FUNCTIONS,
+        math::FUNCTIONS,
+        color::FUNCTIONS,
+        ramp::FUNCTIONS,
+        noise::FUNCTIONS,
+        hash::FUNCTIONS,
+        texture::FUNCTIONS,
+        hit::FUNCTIONS,
+    ]
+    .into_iter()
+    .flatten()
+    .copied()
+}
+
+/// Registers the library. `names` are the parameters that scripts may ask of `p`.
+pub(super) fn register(engine: &mut Engine, names: &BTreeSet<String>) {
+    compare::register(engine);
+    vectors::register(engine);
+    swizzle::register(engine);
+    math::register(engine);
+    color::register(engine);
+    ramp::register(engine);
+    noise::register(engine);
+    hash::register(engine);
+    texture::register(engine);
+    hit::register(engine);
+    parameters::register(engine, names);
+}

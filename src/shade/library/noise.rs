@@ -1,0 +1,81 @@
+//! Noise: all from one source, `fastnoise-lite` with its portable arithmetic, at frequency 1.
+//!
+//! Points may be a vec2 or a vec3. A component beyond ±2²⁰ counts as ±2²⁰, where floats have an eighth of a unit left
+//! between them; a point with a NaN gives NaN.
+
+use fastnoise_lite::{CellularDistanceFunction, CellularReturnType, FastNoiseLite, FractalType, NoiseType};
+use rhai::{Dynamic, Engine};
+
+use super::Function;
+use super::math::clamp;
+use super::operand::{Operand, Outcome, refuse};
+use crate::shade::fault::Fault;
+
+pub(super) const FUNCTIONS: &[Function] = &[
+    Function { name: "value_noise", form: "value_noise(point)", about: "smooth noise 0 … 1, lattice values interpolated" },
+    Function { name: "gradient_noise", form: "gradient_noise(point)", about: "Perlin noise −1 … 1, 0 at whole coordinates" },
+    Function { name: "cellular_noise", form: "cellular_noise(point)", about: "distance to the nearest of scattered points, 0 … 1.5" },
+    Function { name: "cell_id", form: "cell_id(point)", about: "a number 0 … 1 that belongs to the nearest scattered point" },
+    Function {
+        name: "fbm",
+        form: "fbm(point, octaves)",
+        about: "gradient noise −1 … 1 summed over 1 to 10 octaves, each twice as fine and half as strong",
+    },
+];
+
+const LIMIT: f32 = 1_048_576.0;
+const MAX_OCTAVES: i64 = 10;
+
+fn noise(kind: NoiseType) -> FastNoiseLite {
+    let mut noise = FastNoiseLite::new();
+    noise.set_frequency(Some(1.0));
+    noise.set_noise_type(Some(kind));
+    noise
+}
+
+fn cells(given: CellularReturnType) -> FastNoiseLite {
+    let mut noise = noise(NoiseType::Cellular);
+    noise.set_cellular_distance_function(Some(CellularDistanceFunction::Euclidean));
+    noise.set_cellular_return_type(Some(given));
+    noise
+}
+
+fn sample(name: &str, noise: &FastNoiseLite, point: Dynamic) -> Outcome<f32> {
+    let operand = match Operand::of(&point) {
+        Some(operand @ (Operand::Vec2(_) | Operand::Vec3(_))) => operand,
+        _ => return Err(refuse(name, &[point])),
+    };
+    let at = |lane| clamp(operand.lane(lane), -LIMIT, LIMIT);
+    if (0..operand.width()).any(|lane| at(lane).is_nan()) {
+        return Ok(f32::NAN);
+    }
+    Ok(match operand {
+        Operand::Vec2(_) => noise.get_noise_2d(at(0), at(1)),
+        _ => noise.get_noise_3d(at(0), at(1), at(2)),
+    })
+}
+
+pub(super) fn register(engine: &mut Engine) {
+    let value = noise(NoiseType::Value);
+    engine.register_fn("value_noise", move |point: Dynamic| {
+        sample("value_noise", &value, point).map(|n| 0.5 + 0.5 * n)
+    });
+    let gradient = noise(NoiseType::Perlin);
+    engine.register_fn("gradient_noise", move |point: Dynamic| sample("gradient_noise", &gradient, point));
+    // The source gives the distance less 1.
+    let distance = cells(CellularReturnType::Distance);
+    engine.register_fn("cellular_noise", move |point: Dynamic| {
+        sample("cellular_noise", &distance, point).map(|n| n + 1.0)
+    });
+    let id = cells(CellularReturnType::CellValue);
+    engine.register_fn("cell_id", move |point: Dynamic| sample("cell_id", &id, point).map(|n| 0.5 + 0.5 * n));
+    engine.register_fn("fbm", |point: Dynamic, octaves: i64| {
+        if !(1..=MAX_OCTAVES).contains(&octaves) {
+            return Err(Fault::new(format!("`fbm` takes 1 to {MAX_OCTAVES} octaves, not {octaves}")).into());
+        }
+        let mut layered = noise(NoiseType::Perlin);
+        layered.set_fractal_type(Some(FractalType::FBm));
+        layered.set_fractal_octaves(i32::try_from(octaves).ok());
+        sample("fbm", &layered, point)
+    });
+}

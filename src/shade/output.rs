@@ -1,0 +1,200 @@
+//! From the record that `surface` returns to a row of an [`OutputBatch`].
+
+use rhai::Dynamic;
+
+use super::batch::OutputBatch;
+use super::fault::Fault;
+use super::library::kind;
+use super::names::{AOV_PREFIX, OutputSet};
+use crate::math::Vec3;
+
+/// The outputs of one hit: what the record holds, checked and converted.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Row {
+    base_color: Option<Vec3>,
+    metallic: Option<f32>,
+    roughness: Option<f32>,
+    specular: Option<f32>,
+    ior: Option<f32>,
+    transmission: Option<f32>,
+    opacity: Option<f32>,
+    emission: Option<Vec3>,
+    normal: Option<Vec3>,
+    occlusion: Option<f32>,
+    feature: Option<Vec3>,
+    line_color: Option<Vec3>,
+    line_width: Option<f32>,
+    priority: Option<i32>,
+    color: Option<Vec3>,
+    /// By place in the list of names; may be shorter than it.
+    aovs: Vec<Option<Vec3>>,
+}
+
+/// A fault of the record, and the key it is about.
+pub(super) struct RowFault {
+    pub key: Option<String>,
+    pub fault: Fault,
+}
+
+impl Row {
+    /// What a hit gets whose script failed: it shines in a colour that no one chooses, and draws no line.
+    pub fn marker() -> Self {
+        Self { color: Some(Vec3::new(1.0, 0.0, 1.0)), line_width: Some(0.0), ..Self::default() }
+    }
+
+    /// Reads a record. `aovs` are the names of the extra outputs, sorted.
+    pub fn read(value: &Dynamic, aovs: &[String]) -> Result<Self, RowFault> {
+        let Ok(record) = value.as_map_ref() else {
+            let fault = Fault::new(format!("`surface` must return a record, but it returned {}", kind(value)));
+            let hint = if value.is_unit() { "is there a `;` after the record?" } else { "return #{ base_color: … }" };
+            return Err(RowFault { key: None, fault: fault.hint(hint) });
+        };
+        let mut row = Self::default();
+        for (key, value) in record.iter() {
+            row.put(key, value, aovs).map_err(|fault| RowFault { key: Some(key.to_string()), fault })?;
+        }
+        Ok(row)
+    }
+
+    fn put(&mut self, key: &str, value: &Dynamic, aovs: &[String]) -> Result<(), Fault> {
+        let color = || color(key, value).map(Some);
+        let number = || number(key, value).map(Some);
+        match key {
+            "base_color" => self.base_color = color()?,
+            "metallic" => self.metallic = number()?,
+            "roughness" => self.roughness = number()?,
+            "specular" => self.specular = number()?,
+            "ior" => self.ior = number()?,
+            "transmission" => self.transmission = number()?,
+            "opacity" => self.opacity = number()?,
+            "emission" => self.emission = color()?,
+            "normal" => self.normal = Some(vector(key, value)?),
+            "occlusion" => self.occlusion = number()?,
+            "feature" => self.feature = color()?,
+            "line_color" => self.line_color = color()?,
+            "line_width" => self.line_width = number()?,
+            "priority" => self.priority = Some(whole(key, value)?),
+            "color" => self.color = color()?,
+            _ => {
+                let name = key.strip_prefix(AOV_PREFIX).ok_or_else(|| unknown_output(key))?;
+                let index = aovs.binary_search_by(|known| known.as_str().cmp(name)).map_err(|_| unseen_aov(key))?;
+                if self.aovs.len() <= index {
+                    self.aovs.resize(index + 1, None);
+                }
+                self.aovs[index] = color()?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The error of a key that is no output.
+pub(super) fn unknown_output(key: &str) -> Fault {
+    let names: Vec<_> = OutputSet::named().map(|(name, _)| name).collect();
+    let fault = Fault::new(format!("there is no output `{key}`")).propose(key, names.into_iter());
+    fault.hint(format!("a layer of your own is called `{AOV_PREFIX}` and a name"))
+}
+
+fn unseen_aov(key: &str) -> Fault {
+    Fault::new(format!("the layer `{key}` was not known before rendering"))
+        .hint("write its key out in a record, so that the picture's layers can be planned")
+}
+
+fn mistyped(key: &str, wanted: &str, value: &Dynamic) -> Fault {
+    Fault::new(format!("the output `{key}` must be {wanted}, but it is {}", kind(value)))
+}
+
+fn number(key: &str, value: &Dynamic) -> Result<f32, Fault> {
+    #[expect(clippy::cast_precision_loss, reason = "an int counts as the nearest float")]
+    value.as_float().or_else(|_| value.as_int().map(|x| x as f32)).map_err(|_| mistyped(key, "a number", value))
+}
+
+fn vector(key: &str, value: &Dynamic) -> Result<Vec3, Fault> {
+    value.read_lock::<Vec3>().map(|v| *v).ok_or_else(|| mistyped(key, "a vec3", value))
+}
+
+fn color(key: &str, value: &Dynamic) -> Result<Vec3, Fault> {
+    if let Some(color) = value.read_lock::<Vec3>() {
+        return Ok(*color);
+    }
+    number(key, value).map(Vec3::splat).map_err(|_| {
+        let fault = mistyped(key, "a vec3 or a number", value);
+        if kind(value) == "vec4" { fault.hint("take its first three with `.rgb`") } else { fault }
+    })
+}
+
+fn whole(key: &str, value: &Dynamic) -> Result<i32, Fault> {
+    let int = value.as_int().map_err(|_| mistyped(key, "an int", value))?;
+    i32::try_from(int).map_err(|_| {
+        Fault::new(format!("the output `{key}` must be within ±{}, but it is {int}", i32::MAX))
+    })
+}
+
+/// Empties the columns, and gives the wanted ones and the extra ones room.
+pub(super) fn start(outputs: &mut OutputBatch, aovs: usize) {
+    let OutputBatch {
+        len,
+        base_color,
+        metallic,
+        roughness,
+        specular,
+        ior,
+        transmission,
+        opacity,
+        emission,
+        normal,
+        occlusion,
+        feature,
+        line_color,
+        line_width,
+        priority,
+        color,
+        aovs: extra,
+    } = outputs;
+    *len = 0;
+    for column in [metallic, roughness, specular, ior, transmission, opacity, occlusion] {
+        column.clear();
+    }
+    for column in [base_color, emission, feature] {
+        column.clear();
+    }
+    for column in [normal, line_color, color] {
+        column.clear();
+    }
+    line_width.clear();
+    priority.clear();
+    extra.resize_with(aovs, Vec::new);
+    extra.iter_mut().for_each(Vec::clear);
+}
+
+/// Appends a row to the wanted columns and to the extra ones.
+pub(super) fn append(row: &Row, wanted: OutputSet, outputs: &mut OutputBatch) {
+    macro_rules! columns {
+        ($($flag:ident $column:ident $value:expr;)*) => { $(
+            if wanted.contains(OutputSet::$flag) {
+                outputs.$column.push($value);
+            }
+        )* };
+    }
+    columns! {
+        BASE_COLOR base_color row.base_color.unwrap_or(Vec3::splat(0.8));
+        METALLIC metallic row.metallic.unwrap_or(0.0);
+        ROUGHNESS roughness row.roughness.unwrap_or(1.0);
+        SPECULAR specular row.specular.unwrap_or(1.0);
+        IOR ior row.ior.unwrap_or(1.5);
+        TRANSMISSION transmission row.transmission.unwrap_or(0.0);
+        OPACITY opacity row.opacity.unwrap_or(1.0);
+        EMISSION emission row.emission.unwrap_or(Vec3::ZERO);
+        NORMAL normal row.normal;
+        OCCLUSION occlusion row.occlusion.unwrap_or(1.0);
+        FEATURE feature row.feature.unwrap_or(Vec3::ZERO);
+        LINE_COLOR line_color row.line_color;
+        LINE_WIDTH line_width row.line_width;
+        PRIORITY priority row.priority;
+        COLOR color row.color;
+    }
+    for (index, column) in outputs.aovs.iter_mut().enumerate() {
+        column.push(row.aovs.get(index).copied().flatten().unwrap_or(Vec3::ZERO));
+    }
+    outputs.len += 1;
+}
