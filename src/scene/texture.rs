@@ -85,6 +85,30 @@ impl Texture {
     pub fn sample(&self, _uv: crate::math::Vec2) -> crate::math::Vec4 {
         crate::math::Vec4::ONE
     }
+
+    /// Least and greatest linear value of each channel.
+    #[must_use]
+    pub fn range(&self) -> ([f32; 4], [f32; 4]) {
+        let mut low = [f32::INFINITY; 4];
+        let mut high = [f32::NEG_INFINITY; 4];
+        let mut include = |pixel: [f32; 4]| {
+            for channel in 0..4 {
+                low[channel] = low[channel].min(pixel[channel]);
+                high[channel] = high[channel].max(pixel[channel]);
+            }
+        };
+        match &self.image.pixels {
+            Pixels::Rgba8 { data, srgb } => data.iter().for_each(|pixel| {
+                let mut linear = pixel.map(|byte| f32::from(byte) / 255.0);
+                if *srgb {
+                    linear[..3].iter_mut().for_each(|x| *x = crate::math::linear_from_srgb(*x));
+                }
+                include(linear);
+            }),
+            Pixels::Rgba32F { data } => data.iter().for_each(|pixel| include(*pixel)),
+        }
+        (low, high)
+    }
 }
 
 /// Decodes an image file.

@@ -1,17 +1,46 @@
 //! What a material's shader reads and writes, found from its script's syntax tree and parameters (DESIGN section 4.3).
 //!
-//! TODO by its owner: an abstract interpretation of `surface` with the material's parameters as constants.
+//! `surface` is interpreted abstractly: each value is replaced by what is known of it (type, bounds, and the inputs it
+//! depends on), with the material's parameters as constants. Branches that the parameters rule out are not walked, so a
+//! material without a texture reads no uv, and one whose metalness is 0 is no mirror.
+//!
+//! 1. [`interval`] bounds floats; [`value`] says what is known of a value, and joins what is known on two paths.
+//! 2. [`walk`] holds variables, calls and findings; [`statements`], [`expressions`] and [`chains`] walk the syntax tree.
+//! 3. [`operators`], [`functions`] and [`inputs`] give the bounds of what scripts compute and read.
+//! 4. Here, the record that `surface` returns becomes an [`Analysis`].
+//!
+//! # What the facts promise
+//! They hold for every hit at which the script ends without an error, whatever the inputs are (within what the host
+//! promises of them, see [`inputs::LIMIT`]), and never claim less than what can happen: where the walk does not
+//! understand, it takes a value as unknown, or gives up and says so ([`Analysis::complete`], [`Analysis::blame`]).
+//! Functions that neither the library nor the script defines are taken to be pure. The walk is bounded in time.
 
+mod chains;
+mod expressions;
+mod functions;
+pub mod inputs;
+mod interval;
+mod operators;
+mod statements;
+mod switch;
+mod value;
+mod walk;
+
+use std::fmt;
+use std::rc::Rc;
 use std::sync::Arc;
 
+use self::value::{Abstract, Field, Record, Shape};
+use self::walk::{Flow, Walker};
 use super::names::{InputSet, OutputSet};
-use super::params::Params;
+use super::params::{Params, Value};
+use crate::diag;
 use crate::scene::texture::Texture;
 
 /// What is known of one output.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct OutputFact {
-    /// Whether the key may be in the record at all.
+    /// Whether the key may be in the record at all. A key whose value is `()` counts as left out.
     pub may: bool,
     /// Whether the key is in the record at every hit.
     pub always: bool,
@@ -19,6 +48,19 @@ pub struct OutputFact {
     pub inputs: InputSet,
     /// Least and greatest value of any channel, where bounds are known; NaN is possible only if `None`.
     pub range: Option<[f32; 2]>,
+    /// The value, if it is known and the same wherever the key is in the record.
+    pub constant: Option<Value>,
+}
+
+/// Something in a script that is certainly wrong, or beyond analysis.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Finding {
+    /// Line and column, both from 1; 0 where the script engine does not know.
+    pub place: (usize, usize),
+    /// What is wrong, in one sentence without a full stop.
+    pub message: String,
+    /// What to do about it.
+    pub hint: Option<String>,
 }
 
 /// What a material's shader reads and writes.
@@ -32,6 +74,79 @@ pub struct Analysis {
     pub aovs: Vec<(String, OutputFact)>,
     /// Whether the facts are known to be complete. If not, all inputs are assumed read and all outputs written.
     pub complete: bool,
+    /// If not complete: the construct that stopped the analysis.
+    pub blame: Option<Finding>,
+    /// What is certainly wrong in code that may run: unknown inputs, outputs and parameters. By place.
+    pub findings: Vec<Finding>,
+}
+
+/// Analyses the function `surface(hit, p)` of a compiled script, for a material with these parameters. `textures` is
+/// the scene's table, which texture parameters point into.
+#[must_use]
+pub fn analyse(ast: &rhai::AST, params: &Params, textures: &[Arc<Texture>]) -> Analysis {
+    let functions = walk::functions(ast);
+    let mut walker = Walker::new(&functions, textures);
+    match walk_surface(&mut walker, ast, params) {
+        Ok(Some(record)) => {
+            let mut analysis = Analysis::empty(walker.inputs);
+            for (key, field) in &record.fields {
+                analysis.add(key, field, &mut walker);
+            }
+            analysis.aovs.sort_by(|a, b| a.0.cmp(&b.0));
+            analysis.findings = walker.findings.into_iter().collect();
+            analysis
+        }
+        // No path ends without an error, so nothing is ever written.
+        Ok(None) => {
+            Analysis { findings: walker.findings.into_iter().collect(), ..Analysis::empty(walker.inputs) }
+        }
+        Err(_) => Analysis { blame: walker.blame, findings: walker.findings.into_iter().collect(), ..unknown() },
+    }
+}
+
+/// What is assumed of a script of which nothing is known.
+#[must_use]
+pub fn unknown() -> Analysis {
+    let fact = OutputFact { may: true, inputs: InputSet::all(), ..OutputFact::default() };
+    Analysis {
+        inputs: InputSet::all(),
+        outputs: vec![fact; OutputSet::all().bits().count_ones() as usize],
+        complete: false,
+        ..Analysis::default()
+    }
+}
+
+/// The record that `surface` returns; `None` if it never returns.
+fn walk_surface(walker: &mut Walker, ast: &rhai::AST, params: &Params) -> Flow<Option<Rc<Record>>> {
+    let start = rhai::Position::NONE;
+    // The top level runs first: its constants are `global::NAME` everywhere, its variables are seen by `surface`.
+    match walker.statements(ast.statements()) {
+        Ok(_) => {}
+        Err(walk::Stop::Left) if walker.call().returns.states.is_empty() => return Ok(None),
+        Err(_) => return walker.give_up(start, "a script that returns before `surface`"),
+    }
+    let top_level = walker.call().variables.clone();
+    walker.globals = top_level.iter().map(|variable| (Rc::clone(&variable.name), variable.value.clone())).collect();
+
+    let Some(function) = walker.script_function("surface", 2) else {
+        return walker.give_up(start, "a script without `surface(hit, p)`");
+    };
+    let mut fields = Record { is_params: true, ..Record::default() };
+    for (name, value) in params.0.iter() {
+        let shape = Shape::from_value(value, &mut || walker.fresh());
+        let value = walker.constant(shape);
+        fields.fields.insert(name.as_str().into(), Field::always(value, (0, 0)));
+    }
+    let arguments = vec![walker.constant(Shape::Hit), walker.constant(Shape::Record(Rc::new(fields)))];
+    let returned = match walker.script_call(function, arguments, None, start) {
+        Ok((value, _)) => value,
+        Err(walk::Stop::Left) => return Ok(None),
+        Err(walk::Stop::GaveUp) => return Err(walk::Stop::GaveUp),
+    };
+    match returned.shape {
+        Shape::Record(record) => Ok(Some(record)),
+        _ => walker.give_up(start, "what `surface` returns is not always a record with known keys and so"),
+    }
 }
 
 impl Analysis {
@@ -50,23 +165,124 @@ impl Analysis {
     pub fn is_constant(&self) -> bool {
         self.complete && self.inputs.is_empty()
     }
-}
 
-/// Nothing is known: everything is read, and every output may be written.
-#[must_use]
-pub fn unknown() -> Analysis {
-    let fact = OutputFact { may: true, always: false, inputs: InputSet::all(), range: None };
-    Analysis {
-        inputs: InputSet::all(),
-        outputs: OutputSet::all().iter().map(|_| fact.clone()).collect(),
-        aovs: Vec::new(),
-        complete: false,
+    /// A shader that writes nothing.
+    fn empty(inputs: InputSet) -> Self {
+        let outputs = vec![OutputFact::default(); OutputSet::all().bits().count_ones() as usize];
+        Self { inputs, outputs, complete: true, ..Self::default() }
+    }
+
+    /// Takes in a key of the returned record.
+    fn add(&mut self, key: &str, field: &Field, walker: &mut Walker) {
+        if let Some(name) = key.strip_prefix("aov_") {
+            self.aovs.push((name.to_owned(), fact(field, walker)));
+            return;
+        }
+        match OutputSet::from_name(&key.to_uppercase()).filter(|_| !key.chars().any(char::is_uppercase)) {
+            Some(output) => self.outputs[output.bits().trailing_zeros() as usize] = fact(field, walker),
+            None => {
+                let names = OutputSet::all().iter_names().map(|(name, _)| name.to_lowercase());
+                let message = format!("there is no output `{key}`");
+                let hint = nearest_hint(key, names);
+                walker.findings.insert(Finding { place: field.place, message, hint });
+            }
+        }
     }
 }
 
-/// Analyses a script with the parameters of one material.
-#[must_use]
-pub fn analyse(ast: &rhai::AST, params: &Params, textures: &[Arc<Texture>]) -> Analysis {
-    let _ = (ast, params, textures);
-    unknown()
+fn fact(field: &Field, walker: &mut Walker) -> OutputFact {
+    let Abstract { shape, .. } = &field.value;
+    if *shape == Shape::Unit {
+        return OutputFact::default();
+    }
+    OutputFact {
+        may: true,
+        // What is unknown may be `()`.
+        always: field.always && *shape != Shape::Unknown,
+        inputs: walker.escape(&field.value) | field.presence,
+        range: shape.range().filter(|range| !range.nan).map(|range| [range.low, range.high]),
+        constant: shape.to_value(),
+    }
+}
+
+/// A hint that names the candidate that was perhaps meant.
+fn nearest_hint(name: &str, candidates: impl Iterator<Item = String>) -> Option<String> {
+    let candidates: Vec<String> = candidates.collect();
+    diag::nearest(name, candidates.iter().map(String::as_str)).map(|near| format!("did you mean `{near}`?"))
+}
+
+impl fmt::Display for OutputFact {
+    /// `always, [0.2, 0.6], from uv normal`
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match (self.may, self.always) {
+            (_, true) => "always",
+            (true, false) => "sometimes",
+            (false, false) => "never",
+        })?;
+        if let Some([low, high]) = self.range {
+            write!(f, ", [{low:?}, {high:?}]")?;
+        }
+        if self.inputs.is_empty() {
+            f.write_str(", constant")
+        } else {
+            write!(f, ", from {}", InputNames(self.inputs))
+        }
+    }
+}
+
+impl fmt::Display for Analysis {
+    /// One line for the inputs, one for each output that may be written, one for each finding.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "inputs: {}", InputNames(self.inputs))?;
+        if !self.complete {
+            f.write_str("incomplete")?;
+            if let Some(blame) = &self.blame {
+                write!(f, ": {blame}")?;
+            }
+            writeln!(f)?;
+        } else {
+            for (name, output) in OutputSet::all().iter_names() {
+                let fact = self.output(output);
+                if fact.may {
+                    writeln!(f, "{}: {fact}", name.to_lowercase())?;
+                }
+            }
+            for (name, fact) in &self.aovs {
+                writeln!(f, "aov_{name}: {fact}")?;
+            }
+        }
+        for finding in &self.findings {
+            writeln!(f, "finding {finding}")?;
+        }
+        Ok(())
+    }
+}
+
+impl fmt::Display for Finding {
+    /// `line:column: message (hint)`
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}:{}: {}", self.place.0, self.place.1, self.message)?;
+        match &self.hint {
+            Some(hint) => write!(f, " ({hint})"),
+            None => Ok(()),
+        }
+    }
+}
+
+/// Shows inputs by name, in the order of their bits.
+struct InputNames(InputSet);
+
+impl fmt::Display for InputNames {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.0.is_empty() {
+            return f.write_str("none");
+        }
+        if self.0.is_all() {
+            return f.write_str("all");
+        }
+        for (i, (name, _)) in self.0.iter_names().enumerate() {
+            write!(f, "{}{}", if i > 0 { " " } else { "" }, name.to_lowercase())?;
+        }
+        Ok(())
+    }
 }

@@ -1,0 +1,115 @@
+//! What is known of the inputs on `hit` before any script runs.
+//!
+//! The host keeps these promises: inputs are never NaN nor infinite, their magnitude is at most [`LIMIT`], and unit
+//! vectors are of unit length up to rounding.
+
+use std::rc::Rc;
+
+use super::interval::Interval;
+use super::value::{Abstract, Field, Record, Shape, Vector};
+use super::walk::Walker;
+use crate::scene::texture::TextureRef;
+use crate::shade::names::InputSet;
+
+/// The greatest magnitude of an input. Its square is still a finite `f32`.
+pub const LIMIT: f32 = 1e18;
+
+/// Names that scripts read as `hit.NAME`.
+pub(super) fn names() -> impl Iterator<Item = String> {
+    let called = InputSet::LIGHT | InputSet::MORE_UVS;
+    InputSet::all().difference(called).iter_names().map(|(name, _)| name.to_lowercase())
+}
+
+/// The input of that name.
+pub(super) fn by_name(name: &str) -> Option<InputSet> {
+    if name.chars().any(|c| c.is_uppercase()) {
+        return None;
+    }
+    let input = InputSet::from_name(&name.to_uppercase())?;
+    (!(InputSet::LIGHT | InputSet::MORE_UVS).intersects(input)).then_some(input)
+}
+
+/// Type and bounds of an input.
+pub(super) fn shape(input: InputSet) -> Shape {
+    let any = Interval::within(LIMIT);
+    let positive = Interval::new(0.0, LIMIT);
+    let id = |least| Shape::Int(least, i64::from(u32::MAX));
+    let vector = |channel, count| Shape::Vector(Vector::new(std::iter::repeat_n(channel, count)));
+    match input {
+        InputSet::POSITION => vector(any, 3),
+        InputSet::NORMAL | InputSet::GEOMETRIC_NORMAL | InputSet::INCOMING => Shape::Vector(Vector::unit(3)),
+        InputSet::UV => vector(any, 2),
+        // The fourth component is the sign of the bitangent.
+        InputSet::TANGENT => vector(Interval::UNIT_COMPONENT, 4),
+        InputSet::COLOR => vector(any, 4),
+        InputSet::OBJECT_ID | InputSet::SHADER_ID | InputSet::MATERIAL_ID => id(1),
+        InputSet::POLYGON_ID | InputSet::LIGHT_COUNT => id(0),
+        // Weights of a point that rounding has put just outside of the triangle.
+        InputSet::BARYCENTRIC => vector(Interval::new(-0.001, 1.001), 3),
+        InputSet::DISTANCE | InputSet::DEPTH | InputSet::PIXELS_PER_UNIT => Shape::Float(positive),
+        InputSet::PATH_KIND => Shape::Text(None),
+        InputSet::FRONT_FACING => Shape::Bool(None),
+        InputSet::IRRADIANCE => vector(positive, 3),
+        _ => Shape::Float(any),
+    }
+}
+
+impl Walker<'_> {
+    /// Reads an input.
+    pub(super) fn input(&mut self, input: InputSet) -> Abstract {
+        self.inputs |= input;
+        self.value(shape(input), input)
+    }
+
+    /// `hit.light(index)`.
+    pub(super) fn light(&mut self, index: &Abstract) -> Abstract {
+        self.inputs |= InputSet::LIGHT;
+        let inputs = InputSet::LIGHT | index.all_inputs();
+        let radiance = Vector::new(std::iter::repeat_n(Interval::new(0.0, LIMIT), 3));
+        let parts = [
+            ("direction", Shape::Vector(Vector::unit(3))),
+            ("radiance", Shape::Vector(radiance)),
+            ("visibility", Shape::Float(Interval::UNIT)),
+        ];
+        let mut record = Record::default();
+        for (name, shape) in parts {
+            let value = self.value(shape, inputs);
+            record.fields.insert(name.into(), Field::always(value, (0, 0)));
+        }
+        self.constant(Shape::Record(Rc::new(record)))
+    }
+
+    /// `hit.texture(texture)`.
+    pub(super) fn texture_at_hit(&mut self, texture: &Abstract) -> Abstract {
+        let read = match &texture.shape {
+            Shape::Texture(Some(TextureRef { uv_set: 0, .. })) => InputSet::UV,
+            Shape::Texture(Some(_)) => InputSet::MORE_UVS,
+            _ => InputSet::UV | InputSet::MORE_UVS,
+        };
+        self.inputs |= read;
+        let shape = self.texture_bounds(&texture.shape);
+        let inputs = read | self.escape(texture);
+        self.value(shape, inputs)
+    }
+
+    /// What a lookup in a texture can give.
+    pub(super) fn texture_bounds(&self, texture: &Shape) -> Shape {
+        match texture {
+            Shape::Texture(Some(texture)) => match self.textures.get(texture.texture.index()) {
+                Some(texture) => {
+                    let (low, high) = texture.range();
+                    let channel = |i: usize| {
+                        let bounds = Interval { low: low[i], high: high[i], nan: false };
+                        let known = low[i] <= high[i];
+                        // Interpolation rounds.
+                        if known { bounds.widened_unless_zero() } else { Interval::ANY }
+                    };
+                    Shape::Vector(Vector::new((0..4).map(channel)))
+                }
+                None => Shape::Unknown,
+            },
+            Shape::Texture(None) => Shape::Vector(Vector::new([Interval::ANY; 4])),
+            _ => Shape::Unknown,
+        }
+    }
+}

@@ -1,0 +1,276 @@
+//! Bounds of floats.
+//!
+//! An [`Interval`] bounds what an `f32` of a running script can be. Bounds are sound under rounding: IEEE operations
+//! are monotone, so the bounds of a sum or a product are computed with the very same `f32` operations; whatever is not
+//! correctly rounded, or whose formula is not fixed, is widened outwards. NaN is tracked apart, as a flag. The two zeros
+//! count as equal: nothing that could tell them apart (a division) is given bounds.
+
+/// What a float can be: within `low` … `high`, or NaN if `nan`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Interval {
+    /// Least value, never NaN.
+    pub low: f32,
+    /// Greatest value, never NaN, at least `low`.
+    pub high: f32,
+    /// Whether NaN is possible.
+    pub nan: bool,
+}
+
+/// Relative error that no reasonable order of a few `f32` operations exceeds.
+const SLACK: f64 = 1e-6;
+
+impl Interval {
+    /// Anything, NaN included.
+    pub const ANY: Self = Self { low: f32::NEG_INFINITY, high: f32::INFINITY, nan: true };
+    /// 0 … 1.
+    pub const UNIT: Self = Self { low: 0.0, high: 1.0, nan: false };
+    /// A component of a unit vector, with room for the rounding of its normalization.
+    pub const UNIT_COMPONENT: Self = Self { low: -1.000_001, high: 1.000_001, nan: false };
+
+    /// Between two numbers.
+    pub const fn new(low: f32, high: f32) -> Self {
+        Self { low, high, nan: false }
+    }
+
+    /// Exactly one number.
+    pub const fn exact(x: f32) -> Self {
+        if x.is_nan() { Self::ANY } else { Self::new(x, x) }
+    }
+
+    /// From −`size` to `size`.
+    pub const fn within(size: f32) -> Self {
+        Self::new(-size, size)
+    }
+
+    /// The value, if only one is possible.
+    pub fn value(self) -> Option<f32> {
+        (self.low == self.high && !self.nan).then_some(self.low)
+    }
+
+    /// Whether zero is possible.
+    pub fn has_zero(self) -> bool {
+        self.low <= 0.0 && self.high >= 0.0
+    }
+
+    fn has_infinity(self) -> bool {
+        self.low == f32::NEG_INFINITY || self.high == f32::INFINITY
+    }
+
+    /// Whether every possible value is a finite number.
+    pub fn is_finite(self) -> bool {
+        !self.nan && !self.has_infinity()
+    }
+
+    /// The same, with NaN possible if `nan`.
+    pub fn or_nan(self, nan: bool) -> Self {
+        Self { nan: self.nan || nan, ..self }
+    }
+
+    /// All that either can be.
+    pub fn hull(self, other: Self) -> Self {
+        Self { low: self.low.min(other.low), high: self.high.max(other.high), nan: self.nan || other.nan }
+    }
+
+    /// What both bounds allow: for two sound bounds of one value.
+    pub fn meet(self, other: Self) -> Self {
+        let (low, high) = (self.low.max(other.low), self.high.min(other.high));
+        // Disjoint bounds mean that no number is possible; any of the two is then sound.
+        if low <= high { Self { low, high, nan: self.nan && other.nan } } else { self }
+    }
+
+    /// Bounds moved outwards by the rounding errors of a few operations on values of that size.
+    pub fn widened(self, size: f32) -> Self {
+        if size == 0.0 {
+            return self;
+        }
+        if size == f32::INFINITY {
+            return Self { nan: self.nan, ..Self::ANY };
+        }
+        let slack = f64::from(size) * SLACK;
+        let low = (f64::from(self.low) - slack) as f32;
+        let high = (f64::from(self.high) + slack) as f32;
+        Self { low: low.next_down(), high: high.next_up(), nan: self.nan }
+    }
+
+    /// The greatest magnitude.
+    pub fn size(self) -> f32 {
+        self.low.abs().max(self.high.abs())
+    }
+
+    /// Each bound moved outwards by the rounding errors of a mean of values of its own size; a mean of zeros is zero.
+    pub fn widened_unless_zero(self) -> Self {
+        Self { low: self.low - self.low.abs() * 1e-6, high: self.high + self.high.abs() * 1e-6, nan: self.nan }
+    }
+
+    /// A function that never falls and is computed by the very `f32` operations of `f`.
+    pub fn rising(self, f: impl Fn(f32) -> f32) -> Self {
+        let (low, high) = (f(self.low), f(self.high));
+        Self {
+            low: if low.is_nan() { f32::NEG_INFINITY } else { low },
+            high: if high.is_nan() { f32::INFINITY } else { high },
+            nan: self.nan || low.is_nan() || high.is_nan(),
+        }
+    }
+
+    /// A function that never falls and is computed with small errors; `f` is (nearly) exact.
+    pub fn rising_roughly(self, f: impl Fn(f64) -> f64) -> Self {
+        outwards(f(f64::from(self.low)), f(f64::from(self.high))).or_nan(self.nan)
+    }
+
+    pub fn neg(self) -> Self {
+        Self { low: -self.high, high: -self.low, nan: self.nan }
+    }
+
+    pub fn add(self, other: Self) -> Self {
+        let opposite = |a: Self, b: Self| a.high == f32::INFINITY && b.low == f32::NEG_INFINITY;
+        let (low, high) = (self.low + other.low, self.high + other.high);
+        Self {
+            low: if low.is_nan() { f32::NEG_INFINITY } else { low },
+            high: if high.is_nan() { f32::INFINITY } else { high },
+            nan: self.nan || other.nan || opposite(self, other) || opposite(other, self),
+        }
+    }
+
+    pub fn sub(self, other: Self) -> Self {
+        self.add(other.neg())
+    }
+
+    pub fn mul(self, other: Self) -> Self {
+        let zero_times_infinity = |a: Self, b: Self| a.has_zero() && b.has_infinity();
+        self.corners(other, |a, b| a * b)
+            .or_nan(zero_times_infinity(self, other) || zero_times_infinity(other, self))
+    }
+
+    /// Without bounds if the divisor can be zero.
+    pub fn div(self, other: Self) -> Self {
+        if other.has_zero() {
+            return Self::ANY;
+        }
+        self.corners(other, |a, b| a / b).or_nan(self.has_infinity() && other.has_infinity())
+    }
+
+    /// The remainder with the sign of the dividend, as `%`.
+    pub fn rem(self, other: Self) -> Self {
+        if let (Some(a), Some(b)) = (self.value(), other.value()) {
+            return Self::exact(a % b);
+        }
+        let size = self.size().min(other.size());
+        Self {
+            low: if self.low < 0.0 { -size } else { 0.0 },
+            high: if self.high > 0.0 { size } else { 0.0 },
+            nan: self.nan || other.nan || other.has_zero() || self.has_infinity(),
+        }
+    }
+
+    /// The hull of an operation that is monotone in each operand. What is not a number at a corner (0 · ∞) is next to
+    /// zero there.
+    fn corners(self, other: Self, f: impl Fn(f32, f32) -> f32) -> Self {
+        let at = |a, b| {
+            let x = f(a, b);
+            Self::new(0.0, 0.0).hull_if(x.is_nan(), x)
+        };
+        at(self.low, other.low)
+            .hull(at(self.low, other.high))
+            .hull(at(self.high, other.low))
+            .hull(at(self.high, other.high))
+            .or_nan(self.nan || other.nan)
+    }
+
+    fn hull_if(self, nan: bool, x: f32) -> Self {
+        if nan { self } else { Self::new(x, x) }
+    }
+
+    pub fn abs(self) -> Self {
+        if self.low >= 0.0 {
+            self
+        } else if self.high <= 0.0 {
+            self.neg()
+        } else {
+            Self::new(0.0, self.size()).or_nan(self.nan)
+        }
+    }
+
+    /// The lesser of two. Libraries differ in which operand wins over NaN, so both results are allowed for.
+    pub fn min(self, other: Self) -> Self {
+        let least = Self::new(self.low.min(other.low), self.high.min(other.high));
+        Self::beside_nan(least, self, other)
+    }
+
+    /// The greater of two; see [`Self::min`].
+    pub fn max(self, other: Self) -> Self {
+        let greatest = Self::new(self.low.max(other.low), self.high.max(other.high));
+        Self::beside_nan(greatest, self, other)
+    }
+
+    fn beside_nan(result: Self, a: Self, b: Self) -> Self {
+        let result = if a.nan { result.hull(Self { nan: true, ..b }) } else { result };
+        if b.nan { result.hull(Self { nan: true, ..a }) } else { result }
+    }
+
+    /// `x` moved into `low` … `high`.
+    pub fn clamp(self, low: Self, high: Self) -> Self {
+        if low.high > high.low || low.nan || high.nan {
+            return self.hull(low).hull(high);
+        }
+        let move_in = |x: f32, low: f32, high: f32| x.max(low).min(high);
+        let moved = Self::new(move_in(self.low, low.low, high.low), move_in(self.high, low.high, high.high));
+        if self.nan { moved.hull(Self { nan: true, ..low.hull(high) }) } else { moved }
+    }
+
+    pub fn sqrt(self) -> Self {
+        let nan = self.nan || self.low < 0.0;
+        Self::new(self.low.max(0.0).sqrt(), self.high.max(0.0).sqrt()).or_nan(nan)
+    }
+
+    /// `self` to the power `exponent`. Negative bases have bounds only for whole constant exponents.
+    pub fn pow(self, exponent: Self) -> Self {
+        if self.low < 0.0 {
+            let Some(n) = exponent.value().filter(|n| n.fract() == 0.0 && *n >= 1.0 && n.abs() < 1e6) else {
+                return Self::ANY;
+            };
+            if n % 2.0 == 0.0 {
+                return self.abs().pow(exponent);
+            }
+            return self.rising_roughly(|x| x.powf(f64::from(n)));
+        }
+        // x^y is monotone in x, and monotone in y for each x, so the corners bound it.
+        let at = |x: f32, y: f32| f64::from(x).powf(f64::from(y));
+        let corners = [
+            at(self.low, exponent.low),
+            at(self.low, exponent.high),
+            at(self.high, exponent.low),
+            at(self.high, exponent.high),
+        ];
+        let low = corners.iter().copied().fold(f64::INFINITY, f64::min);
+        let high = corners.iter().copied().fold(0.0, f64::max);
+        let bounds = outwards(low, high);
+        Self { low: bounds.low.max(0.0), high: bounds.high, nan: self.nan || exponent.nan }
+    }
+
+    /// `self · (1 − t) + other · t`, or the same by `self + (other − self) · t`.
+    pub fn mix(self, other: Self, t: Self) -> Self {
+        let one = Self::exact(1.0);
+        let weighted = self.mul(one.sub(t)).add(other.mul(t));
+        let from_start = self.add(other.sub(self).mul(t));
+        let either = weighted.hull(from_start);
+        if t.low >= 0.0 && t.high <= 1.0 && self.is_finite() && other.is_finite() {
+            // A mean lies between its terms, up to rounding.
+            let between = self.hull(other);
+            let bounds = between.widened(between.size()).meet(either.or_nan(false));
+            return Self { nan: either.nan, ..bounds };
+        }
+        either
+    }
+}
+
+/// The interval from `low` to `high`, a little widened; NaN bounds are no bounds.
+fn outwards(low: f64, high: f64) -> Interval {
+    let nan = low.is_nan() || high.is_nan();
+    let low = if low.is_infinite() { low } else { low - low.abs() * SLACK };
+    let high = if high.is_infinite() { high } else { high + high.abs() * SLACK };
+    Interval {
+        low: if low.is_nan() { f32::NEG_INFINITY } else { (low as f32).next_down() },
+        high: if high.is_nan() { f32::INFINITY } else { (high as f32).next_up() },
+        nan,
+    }
+}

@@ -1,0 +1,319 @@
+//! The state of a walk: variables, calls, loops, and what has been found so far.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::rc::Rc;
+use std::sync::Arc;
+
+use rhai::{AST, ASTNode, Position, Stmt};
+
+use super::Finding;
+use super::value::{Abstract, Identity, Join, Place, Shape};
+use crate::scene::texture::Texture;
+use crate::shade::names::InputSet;
+
+/// Expressions that a walk may evaluate before it gives up: bounds its time.
+const MAX_STEPS: u32 = 400_000;
+/// Expressions after which loops are no longer walked round by round.
+const MAX_STEPS_UNROLLED: u32 = 100_000;
+/// Calls inside calls.
+const MAX_CALL_DEPTH: usize = 24;
+
+/// Why the rest of a piece of code is not walked.
+#[derive(Debug)]
+pub(super) enum Stop {
+    /// Control went elsewhere (`return`, `break`, `continue`, `throw`): what follows is not reached from here.
+    Left,
+    /// The script is beyond this analysis.
+    GaveUp,
+}
+
+/// What evaluation yields, unless it does not come back.
+pub(super) type Flow<T> = Result<T, Stop>;
+
+/// A variable in scope.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Variable {
+    pub name: Rc<str>,
+    pub value: Abstract,
+}
+
+/// All variables of a call, outermost block first; a later one shadows an earlier one of the same name.
+pub(super) type Variables = Vec<Variable>;
+
+/// The place where paths meet again: states or values that got there.
+#[derive(Default)]
+pub(super) struct Exits {
+    /// Variables as they were where control left, and the value it took along.
+    pub states: Vec<(Variables, Abstract)>,
+}
+
+/// A loop being walked.
+#[derive(Default)]
+pub(super) struct Loop {
+    pub breaks: Exits,
+    pub continues: Exits,
+    /// What leaving this loop, or a round of it, early depends on.
+    pub escape: InputSet,
+    /// Whether the test comes after the body (`do`).
+    pub test_last: bool,
+    /// Variables outside the loop's body.
+    pub depth: usize,
+}
+
+/// A script function being walked.
+#[derive(Default)]
+pub(super) struct Call {
+    pub variables: Variables,
+    pub loops: Vec<Loop>,
+    pub returns: Exits,
+    /// Whether the first variable is `this`, which the caller gets back.
+    pub has_this: bool,
+    /// What the branches around the current code depend on.
+    pub branches: InputSet,
+    /// What leaving this call early depends on.
+    pub escape: InputSet,
+}
+
+/// A function that the script defines.
+pub(super) struct ScriptFunction {
+    pub parameters: Vec<String>,
+    pub body: Vec<Stmt>,
+    /// Whether it is for one type of `this` only.
+    pub is_typed: bool,
+}
+
+/// Functions of a script by name and number of parameters.
+pub(super) type Functions = BTreeMap<(String, usize), ScriptFunction>;
+
+/// The functions of a script.
+pub(super) fn functions(ast: &AST) -> Functions {
+    let mut functions = Functions::new();
+    for function in ast.iter_functions() {
+        let count = function.params.len();
+        // The engine does not let bodies out, but walks them.
+        let alone = ast.clone_functions_only_filtered(|_, _, _, name, n| name == function.name && n == count);
+        let mut body = Vec::new();
+        alone.walk(&mut |path: &[ASTNode]| {
+            if let [ASTNode::Stmt(statement)] = path {
+                body.push((*statement).clone());
+            }
+            true
+        });
+        let parameters = function.params.iter().map(|name| (*name).to_owned()).collect();
+        let is_typed = function.this_type.is_some();
+        let entry = functions.entry((function.name.to_owned(), count));
+        entry
+            .and_modify(|other| other.is_typed = true)
+            .or_insert(ScriptFunction { parameters, body, is_typed });
+    }
+    functions
+}
+
+/// The walk over one material's shader.
+pub(super) struct Walker<'a> {
+    pub functions: &'a Functions,
+    pub textures: &'a [Arc<Texture>],
+    /// Constants of the script's top level, as `global::NAME`.
+    pub globals: BTreeMap<Rc<str>, Abstract>,
+    /// The innermost call is the last.
+    pub calls: Vec<Call>,
+    /// Inputs that were read.
+    pub inputs: InputSet,
+    /// By place, so that code that is walked twice is blamed once.
+    pub findings: BTreeSet<Finding>,
+    /// Why the walk gave up.
+    pub blame: Option<Finding>,
+    pub next_identity: Identity,
+    steps: u32,
+}
+
+/// A position of the script engine as line and column.
+pub(super) fn place(position: Position) -> Place {
+    (position.line().unwrap_or(0), position.position().unwrap_or(0))
+}
+
+impl<'a> Walker<'a> {
+    pub fn new(functions: &'a Functions, textures: &'a [Arc<Texture>]) -> Self {
+        Self {
+            functions,
+            textures,
+            globals: BTreeMap::new(),
+            calls: vec![Call::default()],
+            inputs: InputSet::empty(),
+            findings: BTreeSet::new(),
+            blame: None,
+            next_identity: 0,
+            steps: 0,
+        }
+    }
+
+    /// A new identity.
+    pub fn fresh(&mut self) -> Identity {
+        self.next_identity += 1;
+        self.next_identity
+    }
+
+    /// A new value. One that is exactly known depends on nothing.
+    pub fn value(&mut self, shape: Shape, inputs: InputSet) -> Abstract {
+        let inputs = if shape.is_exact() || shape.is_container() { InputSet::empty() } else { inputs };
+        Abstract { identity: self.fresh(), shape, inputs }
+    }
+
+    pub fn constant(&mut self, shape: Shape) -> Abstract {
+        self.value(shape, InputSet::empty())
+    }
+
+    pub fn unit(&mut self) -> Abstract {
+        self.constant(Shape::Unit)
+    }
+
+    /// A value of which nothing is known but what it is computed from.
+    pub fn unknown<'v>(&mut self, from: impl IntoIterator<Item = &'v Abstract>) -> Abstract {
+        let inputs = from.into_iter().map(|value| self.escape(value)).collect();
+        self.value(Shape::Unknown, inputs)
+    }
+
+    /// All that a value can tell to code that is not known. `hit` tells everything.
+    pub fn escape(&mut self, value: &Abstract) -> InputSet {
+        if value.holds_hit() {
+            self.inputs = InputSet::all();
+        }
+        value.all_inputs()
+    }
+
+    /// Ends the analysis: the construct at `position` is beyond it.
+    pub fn give_up<T>(&mut self, position: Position, what: &str) -> Flow<T> {
+        let message = format!("{what} cannot be analysed");
+        self.blame.get_or_insert(Finding { place: place(position), message, hint: None });
+        Err(Stop::GaveUp)
+    }
+
+    /// Counts the work; a walk that grows too long ends.
+    pub fn step(&mut self, position: Position) -> Flow<()> {
+        self.steps += 1;
+        if self.steps > MAX_STEPS { self.give_up(position, "a script that branches or loops this much") } else { Ok(()) }
+    }
+
+    /// Whether a loop may still be walked round by round.
+    pub fn may_unroll(&self) -> bool {
+        self.steps < MAX_STEPS_UNROLLED
+    }
+
+    /// Whether another call may be entered.
+    pub fn may_call(&self) -> bool {
+        self.calls.len() < MAX_CALL_DEPTH
+    }
+
+    /// The innermost call.
+    pub fn call(&mut self) -> &mut Call {
+        let last = self.calls.len() - 1;
+        &mut self.calls[last]
+    }
+
+    /// What it depends on whether the current code runs at all, within this call.
+    pub fn control(&mut self) -> InputSet {
+        let call = self.call();
+        call.loops.iter().map(|l| l.escape).collect::<InputSet>() | call.branches | call.escape
+    }
+
+    /// Where a variable is.
+    pub fn find(&mut self, name: &str) -> Option<&mut Variable> {
+        self.call().variables.iter_mut().rev().find(|variable| &*variable.name == name)
+    }
+
+    /// Adds a variable.
+    pub fn declare(&mut self, name: &str, value: Abstract) {
+        self.call().variables.push(Variable { name: name.into(), value });
+    }
+
+    /// The value that is one of two, chosen by `control`.
+    pub fn join_values(&mut self, a: &Abstract, b: &Abstract, control: InputSet) -> Abstract {
+        let joined =
+            Join { control, next_identity: &mut self.next_identity, loop_values: None, widen: false }.join(a, b);
+        self.note_lost_hit(&joined, a, b);
+        joined
+    }
+
+    fn note_lost_hit(&mut self, joined: &Abstract, a: &Abstract, b: &Abstract) {
+        if (a.holds_hit() || b.holds_hit()) && !(joined.holds_hit() && a.holds_hit() && b.holds_hit()) {
+            self.inputs = InputSet::all();
+        }
+    }
+
+    /// The variables after one of two paths, chosen by `control`.
+    pub fn join_variables(&mut self, a: &Variables, b: &Variables, control: InputSet) -> Variables {
+        a.iter()
+            .zip(b)
+            .map(|(a, b)| Variable { name: Rc::clone(&a.name), value: self.join_values(&a.value, &b.value, control) })
+            .collect()
+    }
+
+    /// The variables at the head of a loop: as before it, or as after a round.
+    pub fn join_loop(
+        &mut self,
+        head: &Variables,
+        end: &Variables,
+        control: InputSet,
+        loop_values: &mut BTreeSet<Identity>,
+        widen: bool,
+    ) -> Variables {
+        let mut next = Variables::with_capacity(head.len());
+        for (a, b) in head.iter().zip(end) {
+            let loop_values = Some(&mut *loop_values);
+            let value =
+                Join { control, next_identity: &mut self.next_identity, loop_values, widen }.join(&a.value, &b.value);
+            self.note_lost_hit(&value, &a.value, &b.value);
+            next.push(Variable { name: Rc::clone(&a.name), value });
+        }
+        next
+    }
+
+    /// Joins all paths that got to one place; `None` if none did.
+    pub fn join_exits(&mut self, exits: Exits, control: InputSet) -> Option<(Variables, Abstract)> {
+        exits.states.into_iter().reduce(|(variables_a, value_a), (variables_b, value_b)| {
+            (
+                self.join_variables(&variables_a, &variables_b, control),
+                self.join_values(&value_a, &value_b, control),
+            )
+        })
+    }
+
+    /// Walks a piece of code whose running depends on `inputs`.
+    pub fn under<T>(&mut self, inputs: InputSet, walk: impl FnOnce(&mut Self) -> Flow<T>) -> Flow<T> {
+        let outer = self.call().branches;
+        self.call().branches |= inputs;
+        let result = walk(self);
+        self.call().branches = outer;
+        result
+    }
+
+    /// Walks two paths from the current state, of which one is taken by a choice that depends on `control`, and goes
+    /// on with what is known after either.
+    pub fn either(
+        &mut self,
+        control: InputSet,
+        first: impl FnOnce(&mut Self) -> Flow<Abstract>,
+        second: impl FnOnce(&mut Self) -> Flow<Abstract>,
+    ) -> Flow<Abstract> {
+        let before = self.call().variables.clone();
+        let first = self.under(control, first);
+        if let Err(Stop::GaveUp) = first {
+            return first;
+        }
+        let after_first = std::mem::replace(&mut self.call().variables, before);
+        let second = self.under(control, second);
+        match (first, second) {
+            (_, Err(Stop::GaveUp)) => Err(Stop::GaveUp),
+            (Err(_), second) => second,
+            (Ok(value), Err(Stop::Left)) => {
+                self.call().variables = after_first;
+                Ok(value)
+            }
+            (Ok(first), Ok(second)) => {
+                let after_second = std::mem::take(&mut self.call().variables);
+                self.call().variables = self.join_variables(&after_first, &after_second, control);
+                Ok(self.join_values(&first, &second, control))
+            }
+        }
+    }
+}

@@ -1,0 +1,1 @@
+//! Shaders as they are shipped.
