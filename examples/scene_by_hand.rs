@@ -54,10 +54,7 @@ fn main() -> Result<(), Diagnostics> {
     let mesh = scene.add_mesh(Mesh {
         name: "octahedron".into(),
         positions: vec![Vec3::X, Vec3::Y, Vec3::Z, Vec3::NEG_X, Vec3::NEG_Y, Vec3::NEG_Z],
-        triangles: vec![
-            [0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2],
-            [1, 0, 5], [3, 1, 5], [4, 3, 5], [0, 4, 5],
-        ],
+        triangles: vec![[0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2], [1, 0, 5], [3, 1, 5], [4, 3, 5], [0, 4, 5]],
         ..Mesh::default()
     });
     for (name, x) in [("left", -1.1), ("right", 1.1)] {

@@ -12,7 +12,7 @@ use crate::scene::ids::MaterialId;
 use crate::scene::settings::{Background, FilterKind, LineSettings, RayKinds};
 use crate::shade::analysis::OutputFact;
 use crate::shade::bsdf::MIRROR_ROUGHNESS;
-use crate::shade::{Analysis, InputSet, Mode, OutputSet, Shaders};
+use crate::shade::{Analysis, InputSet, Mode, OutputSet, Shader, Shaders};
 
 /// What rendering does with the hits of one material.
 #[derive(Clone, Debug, PartialEq)]
@@ -85,22 +85,14 @@ impl Plan {
     #[must_use]
     pub fn new(scene: &Scene, shaders: &Shaders, layers: &[Layer]) -> Self {
         let settings = scene.render();
-        let color = layers.iter().any(|layer| {
-            matches!(layer, Layer::Rgba | Layer::Color | Layer::Aov(..))
-        });
+        let color = layers.iter().any(|layer| matches!(layer, Layer::Rgba | Layer::Color | Layer::Aov(..)));
         let used = used_materials(scene);
         let tests = scene.lines();
         let wants_feature = tests.feature.is_some() || layers.contains(&Layer::Feature);
 
-        let mut materials: Vec<MaterialPlan> = scene
-            .materials()
-            .iter()
-            .enumerate()
-            .map(|(index, _)| {
-                let shader = shaders.of(MaterialId::from_index(index));
-                plan_material(shader.analysis(), shader.mode(), !scene.lights().is_empty(), color, used[index])
-            })
-            .collect();
+        let lights = !scene.lights().is_empty();
+        let mut materials: Vec<MaterialPlan> =
+            shaders.iter().zip(&used).map(|(shader, used)| plan_material(shader, lights, color, *used)).collect();
         let any = |what: fn(&MaterialPlan) -> bool| materials.iter().any(|m| m.used && what(m));
         let reflects = any(|m| m.reflects);
         let passes = any(|m| m.refracts || m.see_through);
@@ -108,8 +100,8 @@ impl Plan {
         let refraction_depth = if passes { settings.refraction_depth } else { 0 };
 
         let lines = plan_lines(scene, shaders, layers, &used);
-        for (index, material) in materials.iter_mut().enumerate() {
-            let may = may_write(shaders.of(MaterialId::from_index(index)).analysis());
+        for (material, shader) in materials.iter_mut().zip(shaders.iter()) {
+            let may = may_write(shader.analysis());
             if lines.is_some() {
                 material.wanted |= may & (OutputSet::LINE_COLOR | OutputSet::LINE_WIDTH | OutputSet::PRIORITY);
             }
@@ -186,7 +178,8 @@ fn bounds(fact: &OutputFact, default: f32) -> Option<[f32; 2]> {
     Some(if fact.always { [low, high] } else { [low.min(default), high.max(default)] })
 }
 
-fn plan_material(analysis: &Analysis, mode: Mode, lights: bool, color: bool, used: bool) -> MaterialPlan {
+fn plan_material(shader: &Shader, lights: bool, color: bool, used: bool) -> MaterialPlan {
+    let analysis = shader.analysis();
     let least = |output, default| bounds(analysis.output(output), default).map_or(f32::NEG_INFINITY, |b| b[0]);
     let greatest = |output, default| bounds(analysis.output(output), default).map_or(f32::INFINITY, |b| b[1]);
     let bypass = analysis.output(OutputSet::COLOR).always;
@@ -213,8 +206,8 @@ fn plan_material(analysis: &Analysis, mode: Mode, lights: bool, color: bool, use
     }
     MaterialPlan {
         wanted: wanted & may_write(analysis),
-        inputs: analysis.inputs,
-        mode,
+        inputs: shader.needs(),
+        mode: shader.mode(),
         lit,
         lights: lights && (lit || analysis.inputs.intersects(InputSet::LIGHTS)),
         reflects,

@@ -55,11 +55,32 @@ fn a_scene_becomes_a_png_and_an_exr() {
     let stats = fs::read_to_string(place.folder.path().join("stats.json")).expect("the statistics are written");
     let stats: serde_json::Value = serde_json::from_str(&stats).expect("they are JSON");
     for path in [
-        "/seconds/total", "/seconds/load", "/seconds/build", "/seconds/trace", "/seconds/shade", "/seconds/lines",
-        "/seconds/film", "/threads", "/rays/camera", "/rays/shadow", "/rays/reflection", "/rays/refraction",
-        "/samples", "/bytes_per_sample", "/lines/pairs_tested", "/lines/lined_samples", "/lines/clamped_widths",
-        "/gate/nan", "/gate/infinite", "/gate/negative", "/triangles", "/shaders/0/name", "/shaders/0/mode",
-        "/shaders/0/hits", "/shaders/0/seconds", "/plan",
+        "/seconds/total",
+        "/seconds/load",
+        "/seconds/build",
+        "/seconds/trace",
+        "/seconds/shade",
+        "/seconds/lines",
+        "/seconds/film",
+        "/threads",
+        "/rays/camera",
+        "/rays/shadow",
+        "/rays/reflection",
+        "/rays/refraction",
+        "/samples",
+        "/bytes_per_sample",
+        "/lines/pairs_tested",
+        "/lines/lined_samples",
+        "/lines/clamped_widths",
+        "/gate/nan",
+        "/gate/infinite",
+        "/gate/negative",
+        "/triangles",
+        "/shaders/0/name",
+        "/shaders/0/mode",
+        "/shaders/0/hits",
+        "/shaders/0/seconds",
+        "/plan",
     ] {
         assert!(stats.pointer(path).is_some_and(|value| !value.is_null()), "{path} is missing in {stats:#}");
     }
@@ -152,7 +173,11 @@ fn missing_and_unknown_files_are_named() {
     place.run(&["render", "nothing.glb"]).exits(1).says("nothing.glb").says("no such file");
     place.file("scene.blend", "x");
     place.run(&["render", "scene.blend"]).exits(1).says("scene.blend").says(".toml");
-    with_scene("ink.rhai", "missing.rhai").run(&["render", "scene.toml"]).exits(1).says("missing.rhai").says("scene.toml:");
+    with_scene("ink.rhai", "missing.rhai")
+        .run(&["render", "scene.toml"])
+        .exits(1)
+        .says("missing.rhai")
+        .says("scene.toml:");
 }
 
 #[test]

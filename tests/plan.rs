@@ -107,7 +107,8 @@ fn columns_that_no_test_reads_take_no_memory() {
 fn layers_are_the_same_whichever_others_are_made() {
     let text = format!("{SMALL}{CAMERA}{SUN}{}", sphere("shader = \"builtin:cel\""));
     let alone = render_text(&text, &[Layer::Rgba]).0;
-    let (all, _) = render_text(&text, &[Layer::Rgba, Layer::Color, Layer::Line, Layer::Depth, Layer::Normal, Layer::Uv]);
+    let (all, _) =
+        render_text(&text, &[Layer::Rgba, Layer::Color, Layer::Line, Layer::Depth, Layer::Normal, Layer::Uv]);
     let first = Picture { channels: all.channels[..4].to_vec(), ..all };
     assert_eq!(first.bits(), alone.bits());
 }

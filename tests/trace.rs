@@ -9,9 +9,9 @@ use tusche::scene::material::{Material, Script};
 use tusche::scene::mesh::Mesh;
 use tusche::scene::settings::RayKinds;
 use tusche::scene::{Object, Scene, SceneBuilder};
+use tusche::trace::World;
 use tusche::trace::surface::Surface;
 use tusche::trace::triangle::Ray;
-use tusche::trace::World;
 
 fn builder() -> SceneBuilder {
     let mut builder = SceneBuilder::default();
@@ -162,7 +162,12 @@ fn rays_that_leave_a_surface_do_not_meet_it_again_at_any_scale() {
 #[test]
 fn of_surfaces_at_one_depth_the_lowest_object_and_triangle_counts() {
     let square = Mesh {
-        positions: vec![Vec3::new(-1.0, -1.0, 0.0), Vec3::new(1.0, -1.0, 0.0), Vec3::new(1.0, 1.0, 0.0), Vec3::new(-1.0, 1.0, 0.0)],
+        positions: vec![
+            Vec3::new(-1.0, -1.0, 0.0),
+            Vec3::new(1.0, -1.0, 0.0),
+            Vec3::new(1.0, 1.0, 0.0),
+            Vec3::new(-1.0, 1.0, 0.0),
+        ],
         triangles: vec![[0, 1, 2], [0, 2, 3], [0, 1, 2], [0, 2, 3]],
         ..Mesh::default()
     };
@@ -192,7 +197,11 @@ fn a_mesh_used_ten_thousand_times_is_stored_once() {
                 name: format!("ball {x} {y}"),
                 mesh: tusche::scene::ids::MeshId(0),
                 materials: vec![MaterialId(0)],
-                world_from_object: DAffine3::from_translation(DVec3::new(f64::from(x) - 50.0, f64::from(y) - 50.0, 0.0)),
+                world_from_object: DAffine3::from_translation(DVec3::new(
+                    f64::from(x) - 50.0,
+                    f64::from(y) - 50.0,
+                    0.0,
+                )),
                 priority: None,
                 visible_to: RayKinds::all(),
                 lines: true,
@@ -209,11 +218,8 @@ fn a_mesh_used_ten_thousand_times_is_stored_once() {
 
 #[test]
 fn single_sided_surfaces_are_seen_from_the_front_only_but_cast_shadows() {
-    let triangle = Mesh {
-        positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y],
-        triangles: vec![[0, 1, 2]],
-        ..Mesh::default()
-    };
+    let triangle =
+        Mesh { positions: vec![Vec3::ZERO, Vec3::X, Vec3::Y], triangles: vec![[0, 1, 2]], ..Mesh::default() };
     for mirrored in [1.0, -1.0] {
         let mut builder = builder();
         builder.materials[0].double_sided = false;

@@ -13,7 +13,8 @@ pub(super) fn run(arguments: &CompareArguments) -> Result<(), Failure> {
         print(&(figures + "\n"))?;
     } else {
         let Comparison { rmse, psnr, largest, largest_at, differing_share, .. } = &comparison;
-        let place = largest_at.as_ref().map_or_else(String::new, |at| format!(" ({} at {}, {})", at.channel, at.x, at.y));
+        let place =
+            largest_at.as_ref().map_or_else(String::new, |at| format!(" ({} at {}, {})", at.channel, at.x, at.y));
         print(&format!(
             "root mean square error  {rmse:.6}\n\
              peak signal to noise    {psnr:.2} dB\n\

@@ -2,7 +2,7 @@
 //!
 //! This is the only place that prints. Talk goes to standard error, data to standard output.
 
-pub mod args;
+mod args;
 mod compare;
 mod explain;
 mod render;

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use super::args::{LineMode, SceneArguments};
+use super::args::{LineMode, SceneArguments, Size};
 use super::{Failure, terminal};
 use crate::diag::{Diagnostic, Diagnostics};
 use crate::files::FileStore;
@@ -64,26 +64,26 @@ fn load(
     frame: Option<f64>,
     files: &FileStore,
 ) -> Result<(SceneBuilder, Diagnostics), Failure> {
-    let overrides = arguments.set.iter().map(|text| file::Override::parse(text)).collect::<Vec<_>>();
+    // Flags that stand for values of the scene file go the same way as `--set`, so that they are checked the same way.
+    let mut changes = arguments.set.clone();
+    if let Some(Size([width, height])) = arguments.size {
+        changes.push(format!("render.size=[{width}, {height}]"));
+    }
+    if let Some(samples) = arguments.samples.or(arguments.quality.map(|quality| quality.samples())) {
+        changes.push(format!("render.samples={samples}"));
+    }
+    if let Some(seed) = arguments.seed {
+        changes.push(format!("render.seed={seed}"));
+    }
     let mut faults = Diagnostics::default();
-    let overrides: Vec<_> = overrides
-        .into_iter()
-        .filter_map(|parsed| parsed.map_err(|fault| faults.push(fault)).ok())
-        .collect();
+    let parsed =
+        changes.iter().filter_map(|text| file::Override::parse(text).map_err(|fault| faults.extend(fault)).ok());
+    let overrides: Vec<_> = parsed.collect();
     if faults.has_errors() {
         return Err(faults.into());
     }
     let options = file::LoadOptions { frame, camera: arguments.camera.clone() };
     let (mut builder, warnings) = file::load(&arguments.scene, files, &overrides, &options)?;
-    if let Some(size) = arguments.size {
-        builder.render.size = size.0;
-    }
-    if let Some(samples) = arguments.samples.or(arguments.quality.map(|quality| quality.samples())) {
-        builder.render.samples = samples;
-    }
-    if let Some(seed) = arguments.seed {
-        builder.render.seed = seed;
-    }
     builder.lines.enabled &= arguments.lines != LineMode::Off;
     Ok((builder, warnings))
 }

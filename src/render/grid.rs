@@ -106,7 +106,10 @@ mod tests {
         let grid = Grid::new(PixelRect { x0: 5, y0: 7, x1: 105, y1: 50 }, 10);
         assert_eq!(grid.around(0, 1), Part { origin: [5, 7], columns: 2, tiles: vec![0, 1, 10, 11] });
         assert_eq!(grid.around(12, 0), Part { origin: [25, 17], columns: 1, tiles: vec![12] });
-        assert_eq!(grid.around(49, 11), Part { origin: [75, 27], columns: 3, tiles: vec![27, 28, 29, 37, 38, 39, 47, 48, 49] });
+        assert_eq!(
+            grid.around(49, 11),
+            Part { origin: [75, 27], columns: 3, tiles: vec![27, 28, 29, 37, 38, 39, 47, 48, 49] }
+        );
     }
 
     #[test]

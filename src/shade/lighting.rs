@@ -66,10 +66,9 @@ impl Lighting {
             Background::Transparent => PlacedBackground::Color(Vec3::ZERO),
             Background::Color(color) => PlacedBackground::Color(*color),
             Background::Gradient { bottom, top } => PlacedBackground::Gradient { bottom: *bottom, top: *top },
-            Background::Image { texture, strength } => PlacedBackground::Image {
-                texture: Arc::clone(&scene.textures()[texture.index()]),
-                strength: *strength,
-            },
+            Background::Image { texture, strength } => {
+                PlacedBackground::Image { texture: Arc::clone(&scene.textures()[texture.index()]), strength: *strength }
+            }
         };
         Self { lights, background, ambient: scene.render().ambient }
     }

@@ -24,8 +24,8 @@ pub mod program;
 mod script;
 
 pub use analysis::Analysis;
-pub use bsdf::Bsdf;
 pub use batch::{HitBatch, LightSample, OutputBatch};
+pub use bsdf::Bsdf;
 pub use host::Host;
 pub use interpret::{ShadeErrors, Shading};
 pub use lighting::Lighting;

@@ -167,14 +167,7 @@ impl TileTracer<'_> {
     }
 
     /// Lights one hit, fills its node, and sends on what it mirrors and lets pass.
-    fn finish(
-        &self,
-        hit: &WaveHit,
-        plan: &MaterialPlan,
-        outputs: Outputs<'_>,
-        lights: &[LightSample],
-        run: &mut Run,
-    ) {
+    fn finish(&self, hit: &WaveHit, plan: &MaterialPlan, outputs: Outputs<'_>, lights: &[LightSample], run: &mut Run) {
         let direction = hit.ray.direction;
         let Outputs { batch, row } = outputs;
         let opacity = value(&batch.opacity, row, 1.0);
@@ -233,7 +226,12 @@ impl TileTracer<'_> {
         let node = *node;
         if node.reflections < self.plan.reflection_depth {
             let weight = bounces.reflection * opacity;
-            self.send(hit, &node, Departure { kind: PathKind::Reflection, direction: mirrored, weight, straight: false }, run);
+            self.send(
+                hit,
+                &node,
+                Departure { kind: PathKind::Reflection, direction: mirrored, weight, straight: false },
+                run,
+            );
         }
         if node.refractions < self.plan.refraction_depth {
             let refraction = bounces.refraction * opacity;

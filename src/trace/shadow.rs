@@ -112,5 +112,4 @@ impl TileTracer<'_> {
             samples[hits[index].0].visibility *= passes[index];
         }
     }
-
 }

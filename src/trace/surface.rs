@@ -44,8 +44,8 @@ impl Surface {
         let m = object.world_from_object;
         let apply_abs = |p: Vec3| m.x_axis.abs() * p.x.abs() + m.y_axis.abs() * p.y.abs() + m.z_axis.abs() * p.z.abs();
         let position = m * local + object.translation;
-        let error = apply_abs(local_error) * (1.0 + gamma(3))
-            + (apply_abs(local) + object.translation.abs()) * gamma(4);
+        let error =
+            apply_abs(local_error) * (1.0 + gamma(3)) + (apply_abs(local) + object.translation.abs()) * gamma(4);
 
         let flip = if hit.front { 1.0 } else { -1.0 };
         let geometric_normal = (object.normal_from_object * (b - a).cross(c - a)).try_normalize();
@@ -147,8 +147,7 @@ impl Surface {
         }
         let corners = Self::corners(object, hit);
         let [a, b, c] = corners.map(|vertex| object.world_from_object * object.mesh.positions[vertex]);
-        let [na, nb, nc] =
-            corners.map(|vertex| (object.normal_from_object * normals[vertex]).normalize_or_zero());
+        let [na, nb, nc] = corners.map(|vertex| (object.normal_from_object * normals[vertex]).normalize_or_zero());
         let (e1, e2) = (b - a, c - a);
         let normal = e1.cross(e2);
         let area_squared = normal.length_squared();

@@ -56,7 +56,12 @@ impl BoxTree {
     /// Visits the leaf places whose boxes a ray may meet within `*t_max`, roughly front to back. `visit` gets a range
     /// of places in [`Self::order`], may lower `t_max`, and returns whether to go on.
     #[inline]
-    pub fn traverse(&self, ray: &Ray, t_max: &mut f32, mut visit: impl FnMut(std::ops::Range<usize>, &mut f32) -> bool) {
+    pub fn traverse(
+        &self,
+        ray: &Ray,
+        t_max: &mut f32,
+        mut visit: impl FnMut(std::ops::Range<usize>, &mut f32) -> bool,
+    ) {
         let origin = Vec3A::from(ray.origin);
         let inverse = Vec3A::from(ray.inverse);
         let enter = |node: &Bvh2Node| {
@@ -199,12 +204,7 @@ impl MeshTree {
     /// Shows each triangle that the ray meets within `*t_max` to `accept`, with its id, roughly front to back.
     /// `accept` may lower `t_max` and returns whether to go on.
     #[inline]
-    pub fn intersect(
-        &self,
-        ray: &Ray,
-        t_max: &mut f32,
-        mut accept: impl FnMut(u32, TriangleHit, &mut f32) -> bool,
-    ) {
+    pub fn intersect(&self, ray: &Ray, t_max: &mut f32, mut accept: impl FnMut(u32, TriangleHit, &mut f32) -> bool) {
         self.tree.traverse(ray, t_max, |places, t_max| {
             for place in places {
                 if let Some(hit) = ray.triangle(&self.triangles[place], *t_max)

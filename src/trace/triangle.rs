@@ -92,8 +92,7 @@ impl Ray {
             return None;
         }
         let determinant = u + v + w;
-        let t_scaled =
-            u * (self.shear.z * a[kz]) + v * (self.shear.z * b[kz]) + w * (self.shear.z * c[kz]);
+        let t_scaled = u * (self.shear.z * a[kz]) + v * (self.shear.z * b[kz]) + w * (self.shear.z * c[kz]);
         let t = t_scaled / determinant;
         // Written so that NaN (no area, or a coordinate that is not finite) is no hit.
         if t > 0.0 && t <= t_max {

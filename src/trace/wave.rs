@@ -15,8 +15,8 @@ use super::triangle::Ray;
 use super::world::World;
 use crate::math::Vec3;
 use crate::plan::Plan;
-use crate::sample::{PixelRect, SampleBuffer, SampleBufferBuilder, SampleColor};
 use crate::sample::position::SamplePositions;
+use crate::sample::{PixelRect, SampleBuffer, SampleBufferBuilder, SampleColor};
 use crate::scene::Scene;
 use crate::scene::settings::{Background, RayKinds};
 use crate::shade::batch::{HitBatch, OutputBatch};
@@ -130,7 +130,8 @@ impl<'a> TileTracer<'a> {
     pub fn trace(&self, rect: PixelRect, context: &mut TraceContext<'_>) -> TracedTile {
         let start = Instant::now();
         let materials = self.scene.materials().len();
-        let mut work = Work { rays: RayCounts::default(), hits: vec![0; materials], shade_seconds: vec![0.0; materials] };
+        let mut work =
+            Work { rays: RayCounts::default(), hits: vec![0; materials], shade_seconds: vec![0.0; materials] };
         let mut samples = SampleBufferBuilder::new(rect, &self.plan.layout);
         let per_pixel = self.plan.layout.samples_per_pixel as usize;
         let run_pixels = (RUN_SAMPLES / per_pixel).max(1);
@@ -222,11 +223,8 @@ impl<'a> TileTracer<'a> {
                 }
             };
             let ray = Ray::new(wave_ray.origin, wave_ray.direction);
-            let found = if wave_ray.passed < MOST_INVISIBLE {
-                self.world.closest(&ray, kind, f32::INFINITY)
-            } else {
-                None
-            };
+            let found =
+                if wave_ray.passed < MOST_INVISIBLE { self.world.closest(&ray, kind, f32::INFINITY) } else { None };
             match found {
                 Some(hit) => {
                     let surface = Surface::new(self.world, &ray, &hit);

@@ -58,10 +58,7 @@ impl PlacedObject {
     }
 
     fn to_object(&self, ray: &Ray) -> Ray {
-        Ray::new(
-            self.object_from_world * (ray.origin - self.translation),
-            self.object_from_world * ray.direction,
-        )
+        Ray::new(self.object_from_world * (ray.origin - self.translation), self.object_from_world * ray.direction)
     }
 }
 
@@ -83,8 +80,7 @@ impl World {
     #[must_use]
     pub fn new(scene: &Scene, transmissive: &[bool]) -> Self {
         let origin = scene.camera().position;
-        let trees: Vec<Arc<MeshTree>> =
-            scene.meshes().par_iter().map(|mesh| Arc::new(MeshTree::new(mesh))).collect();
+        let trees: Vec<Arc<MeshTree>> = scene.meshes().par_iter().map(|mesh| Arc::new(MeshTree::new(mesh))).collect();
         let objects: Vec<PlacedObject> = scene
             .objects()
             .iter()
@@ -140,7 +136,8 @@ impl World {
     pub fn closest(&self, ray: &Ray, kind: RayKinds, t_max: f32) -> Option<Hit> {
         let mut best: Option<Hit> = None;
         self.each_hit(ray, kind, t_max, |hit, t_max| {
-            let closer = best.is_none_or(|best| (hit.t, hit.object, hit.triangle) < (best.t, best.object, best.triangle));
+            let closer =
+                best.is_none_or(|best| (hit.t, hit.object, hit.triangle) < (best.t, best.object, best.triangle));
             if closer {
                 *t_max = hit.t;
                 best = Some(hit);

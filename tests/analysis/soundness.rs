@@ -256,7 +256,8 @@ impl Writer<'_> {
             }
             8 => {
                 let name = self.name("i");
-                let end = if self.choose(2) == 0 { "4".into() } else { format!("({}) % 6", self.expression(Type::Int, 1)) };
+                let end =
+                    if self.choose(2) == 0 { "4".into() } else { format!("({}) % 6", self.expression(Type::Int, 1)) };
                 let body = self.loop_body(&name, Type::Int, depth, true);
                 format!("for {name} in 0..{end} {{ {body} }}")
             }
@@ -295,7 +296,8 @@ impl Writer<'_> {
             14 if self.this.is_some() => format!("this = {};", self.expression(Type::Float, 2)),
             _ => {
                 let condition = self.expression(Type::Bool, 2);
-                let value = if self.returns == Type::Outputs { self.outputs(1) } else { self.expression(self.returns, 1) };
+                let value =
+                    if self.returns == Type::Outputs { self.outputs(1) } else { self.expression(self.returns, 1) };
                 format!("if {condition} {{ return {value}; }}")
             }
         }
@@ -403,7 +405,9 @@ impl Writer<'_> {
         if depth == 0 {
             return match self.choose(4) {
                 0 => LITERALS[usize::from(self.choose(12))].into(),
-                1 if self.has_hit => ["hit.distance", "hit.curvature", "hit.time", "p.half"][usize::from(self.choose(4))].into(),
+                1 if self.has_hit => {
+                    ["hit.distance", "hit.curvature", "hit.time", "p.half"][usize::from(self.choose(4))].into()
+                }
                 2 if self.this.is_some() => "this".into(),
                 _ => self.variable(Type::Float).unwrap_or_else(|| "0.75".into()),
             };
@@ -417,7 +421,12 @@ impl Writer<'_> {
             }
             7 => format!("{}.{}", self.expression(Type::Vector, d), ["x", "y", "z"][usize::from(self.choose(3))]),
             8 => format!("clamp({}, {}, {})", self.expression(Type::Float, d), self.float(0), self.float(0)),
-            9 => format!("mix({}, {}, {})", self.float(0), self.expression(Type::Float, d), self.expression(Type::Float, d)),
+            9 => format!(
+                "mix({}, {}, {})",
+                self.float(0),
+                self.expression(Type::Float, d),
+                self.expression(Type::Float, d)
+            ),
             10 => format!("step({}, {})", self.expression(Type::Float, d), self.expression(Type::Float, d)),
             11 => format!("smoothstep({}, {}, {})", self.float(0), self.float(0), self.expression(Type::Float, d)),
             12 => {
@@ -487,7 +496,9 @@ impl Writer<'_> {
     fn vector(&mut self, depth: u8) -> String {
         if depth == 0 {
             return match self.choose(3) {
-                0 if self.has_hit => ["hit.normal", "hit.position", "hit.irradiance"][usize::from(self.choose(3))].into(),
+                0 if self.has_hit => {
+                    ["hit.normal", "hit.position", "hit.irradiance"][usize::from(self.choose(3))].into()
+                }
                 _ => self.variable(Type::Vector).unwrap_or_else(|| "vec3(0.25, 0.5, 1.0)".into()),
             };
         }
@@ -543,18 +554,20 @@ fn hit() -> impl Strategy<Value = Hit> {
     let vectors = (vector(LIMIT), vector(1.0), vector(LIMIT));
     let floats = (positive(LIMIT), number(LIMIT), number(LIMIT), 0.0..=1.0_f32);
     let ints = (prop_oneof![1..6_i64, Just(i64::from(u32::MAX))], 0..6_i64);
-    (vectors, floats, ints, any::<bool>(), any::<u8>()).prop_map(|(vectors, floats, ints, front_facing, path_kind)| Hit {
-        position: vectors.0,
-        normal: vectors.1.try_normalize().unwrap_or(Vec3::Z),
-        irradiance: vectors.2.abs(),
-        distance: floats.0,
-        curvature: floats.1,
-        time: floats.2,
-        light: floats.3,
-        object_id: ints.0,
-        polygon_id: ints.1,
-        front_facing,
-        path_kind,
+    (vectors, floats, ints, any::<bool>(), any::<u8>()).prop_map(|(vectors, floats, ints, front_facing, path_kind)| {
+        Hit {
+            position: vectors.0,
+            normal: vectors.1.try_normalize().unwrap_or(Vec3::Z),
+            irradiance: vectors.2.abs(),
+            distance: floats.0,
+            curvature: floats.1,
+            time: floats.2,
+            light: floats.3,
+            object_id: ints.0,
+            polygon_id: ints.1,
+            front_facing,
+            path_kind,
+        }
     })
 }
 
@@ -588,12 +601,8 @@ fn facts(found: &Analysis) -> Vec<(String, OutputFact)> {
 }
 
 fn check(script: &str, hits: &[Hit]) -> Result<bool, TestCaseError> {
-    let values = [
-        ("half", Value::Float(0.5)),
-        ("three", Value::Int(3)),
-        ("on", Value::Bool(true)),
-        ("texture", Value::Unit),
-    ];
+    let values =
+        [("half", Value::Float(0.5)), ("three", Value::Int(3)), ("on", Value::Bool(true)), ("texture", Value::Unit)];
     let found = analysis(script, &values);
     let engine = engine();
     let ast = engine.compile(script).map_err(|error| TestCaseError::fail(format!("{error}\n{script}")))?;

@@ -54,6 +54,8 @@ pub(super) struct Render {
     pub seed: u64,
     /// What rays that leave the scene see.
     pub background: Background,
+    /// Uniform light from all around that surfaces scatter; it casts no shadows.
+    pub ambient: Ambient,
     /// The pixel filter.
     pub filter: Filter,
     /// Radius of the pixel filter in pixels.
@@ -77,6 +79,7 @@ impl Default for Render {
             samples: 16,
             seed: 0,
             background: Background::Color(Color([0.9; 3])),
+            ambient: Ambient::Gray(0.2),
             filter: Filter::BlackmanHarris,
             filter_radius: 1.5,
             reflection_depth: 4,
@@ -84,6 +87,16 @@ impl Default for Render {
             strata: None,
         }
     }
+}
+
+/// A radiance: one number for white light, or a colour.
+#[derive(Clone, Copy, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(untagged)]
+pub(super) enum Ambient {
+    /// White light.
+    Gray(#[schemars(range(min = 0, max = BRIGHT))] f64),
+    /// Coloured light.
+    Color(Color),
 }
 
 /// What rays that leave the scene see.

@@ -20,9 +20,10 @@ mod resolve;
 mod schema;
 
 use std::path::Path;
+use std::sync::Arc;
 
 use super::SceneBuilder;
-use crate::diag::Diagnostics;
+use crate::diag::{Diagnostic, Diagnostics, Source};
 use crate::files::FileStore;
 
 pub use overrides::Override;
@@ -37,7 +38,7 @@ pub struct LoadOptions {
     pub camera: Option<String>,
 }
 
-/// Reads a scene file, and everything that it names. Warnings come beside the value.
+/// Reads a scene file, or a bare model as a scene, and everything that it names. Warnings come beside the value.
 ///
 /// Relative paths are relative to the file, those in `overrides` to the working directory.
 ///
@@ -50,7 +51,18 @@ pub fn load(
     overrides: &[Override],
     options: &LoadOptions,
 ) -> Result<(SceneBuilder, Diagnostics), Diagnostics> {
-    let source = files.read_text(path)?;
+    let extension = path.extension().map(|extension| extension.to_string_lossy().to_lowercase());
+    let source = match extension.as_deref() {
+        Some("toml") => files.read_text(path)?,
+        Some("gltf" | "glb") => {
+            files.read(path)?;
+            model_scene(path)?
+        }
+        _ => {
+            let fault = Diagnostic::error("this is neither a scene file nor a model").in_file(path);
+            return Err(fault.hint("scene files end in .toml, models in .gltf or .glb").into());
+        }
+    };
     let mut document = document::parse(&source)?;
     let mut faults = Diagnostics::default();
     let schema = schema();
@@ -70,4 +82,20 @@ pub fn load(
         None => (true, usize::MAX),
     });
     if faults.has_errors() { Err(faults) } else { Ok((builder, faults)) }
+}
+
+/// The scene file that a bare model stands for: what a scene file leaves out is framed and lit, and creases draw lines.
+fn model_scene(path: &Path) -> Result<Arc<Source>, Diagnostic> {
+    let bad_name = || Diagnostic::error("the name of this file is not valid text").in_file(path);
+    let file = path.file_name().and_then(|name| name.to_str()).ok_or_else(bad_name)?;
+    let name = path.file_stem().and_then(|name| name.to_str()).ok_or_else(bad_name)?;
+    let quote = |text: &str| serde_json::Value::from(text).to_string();
+    let text = format!(
+        "[render]\nbackground = {{ bottom = [0.83, 0.83, 0.82], top = [0.96, 0.96, 0.97] }}\n\
+         [lines]\nnormal = 50.0\n\
+         [[objects]]\nname = {}\ngltf = {}\n",
+        quote(name),
+        quote(file)
+    );
+    Ok(Source::new(format!("<scene of {}>", path.display()), text))
 }

@@ -143,9 +143,7 @@ impl<'a> Walker<'a> {
         let first = self.expression(term)?;
         match &first.shape {
             Shape::Unit => self.coalesce(others),
-            Shape::Unknown => {
-                self.either(first.inputs, |_| Ok(first.clone()), |walker| walker.coalesce(others))
-            }
+            Shape::Unknown => self.either(first.inputs, |_| Ok(first.clone()), |walker| walker.coalesce(others)),
             _ => Ok(first),
         }
     }

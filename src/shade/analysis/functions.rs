@@ -12,10 +12,46 @@ use super::walk::{Flow, Walker};
 
 /// Functions of the script engine that change their first argument.
 const MUTATING: [&str; 40] = [
-    "append", "chop", "clear", "crop", "dedup", "drain", "extract", "fill_with", "for_each", "insert", "make_lower",
-    "make_upper", "mixin", "order", "order_by", "order_desc", "pad", "pop", "push", "remove", "replace", "retain",
-    "reverse", "set", "set_bit", "set_bits", "set_tag", "shift", "sort", "sort_by", "sort_desc", "splice", "split",
-    "take", "trim", "truncate", "write_ascii", "write_be", "write_le", "write_utf8",
+    "append",
+    "chop",
+    "clear",
+    "crop",
+    "dedup",
+    "drain",
+    "extract",
+    "fill_with",
+    "for_each",
+    "insert",
+    "make_lower",
+    "make_upper",
+    "mixin",
+    "order",
+    "order_by",
+    "order_desc",
+    "pad",
+    "pop",
+    "push",
+    "remove",
+    "replace",
+    "retain",
+    "reverse",
+    "set",
+    "set_bit",
+    "set_bits",
+    "set_tag",
+    "shift",
+    "sort",
+    "sort_by",
+    "sort_desc",
+    "splice",
+    "split",
+    "take",
+    "trim",
+    "truncate",
+    "write_ascii",
+    "write_be",
+    "write_le",
+    "write_utf8",
 ];
 
 impl Walker<'_> {
@@ -276,9 +312,8 @@ fn length(v: &Vector) -> Interval {
 
 fn dot(a: &Vector, b: &Vector) -> Interval {
     let products = a.channels.iter().zip(&b.channels).map(|(a, b)| a.mul(*b));
-    let (sum, size) = products.fold((Interval::exact(0.0), 0.0_f32), |(sum, size), product| {
-        (sum.add(product), size.max(product.size()))
-    });
+    let (sum, size) = products
+        .fold((Interval::exact(0.0), 0.0_f32), |(sum, size), product| (sum.add(product), size.max(product.size())));
     let limit = slightly_more(a.length * b.length);
     let sum = sum.widened(size);
     if sum.is_finite() && limit.is_finite() { sum.meet(Interval::within(limit)) } else { sum }

@@ -137,8 +137,7 @@ impl Interval {
 
     pub fn mul(self, other: Self) -> Self {
         let zero_times_infinity = |a: Self, b: Self| a.has_zero() && b.has_infinity();
-        self.corners(other, |a, b| a * b)
-            .or_nan(zero_times_infinity(self, other) || zero_times_infinity(other, self))
+        self.corners(other, |a, b| a * b).or_nan(zero_times_infinity(self, other) || zero_times_infinity(other, self))
     }
 
     /// Without bounds if the divisor can be zero.

@@ -97,9 +97,7 @@ pub fn analyse(ast: &rhai::AST, params: &Params, textures: &[Arc<Texture>]) -> A
             analysis
         }
         // No path ends without an error, so nothing is ever written.
-        Ok(None) => {
-            Analysis { findings: walker.findings.into_iter().collect(), ..Analysis::empty(walker.inputs) }
-        }
+        Ok(None) => Analysis { findings: walker.findings.into_iter().collect(), ..Analysis::empty(walker.inputs) },
         Err(_) => Analysis { blame: walker.blame, findings: walker.findings.into_iter().collect(), ..unknown() },
     }
 }
@@ -222,11 +220,7 @@ impl fmt::Display for OutputFact {
         if let Some([low, high]) = self.range {
             write!(f, ", [{low:?}, {high:?}]")?;
         }
-        if self.inputs.is_empty() {
-            f.write_str(", constant")
-        } else {
-            write!(f, ", from {}", InputNames(self.inputs))
-        }
+        if self.inputs.is_empty() { f.write_str(", constant") } else { write!(f, ", from {}", InputNames(self.inputs)) }
     }
 }
 

@@ -165,12 +165,7 @@ impl Walker<'_> {
     }
 
     /// A `switch` on an unknown value: any case may be taken.
-    fn open_switch(
-        &mut self,
-        subject: &Abstract,
-        cases: &SwitchCasesCollection,
-        position: Position,
-    ) -> Flow<Abstract> {
+    fn open_switch(&mut self, subject: &Abstract, cases: &SwitchCasesCollection, position: Position) -> Flow<Abstract> {
         let mut control = subject.all_inputs();
         self.escape(subject);
         // All conditions first: any of them may be what decides.
@@ -192,11 +187,7 @@ impl Walker<'_> {
             return if cases.def_case.is_some() { Err(Stop::Left) } else { Ok(self.unit()) };
         }
         let case = &cases.expressions[index].rhs;
-        self.either(
-            control,
-            |walker| walker.expression(case),
-            |walker| walker.open_cases(cases, index + 1, control),
-        )
+        self.either(control, |walker| walker.expression(case), |walker| walker.open_cases(cases, index + 1, control))
     }
 
     /// Walks `while`, `loop` and `do`. `condition` is an expression and the value of it that means another round.

@@ -338,9 +338,11 @@ impl Join<'_> {
             },
             (Shape::Vector(x), Shape::Vector(y)) if x.channels.len() == y.channels.len() => {
                 let channels = x.channels.iter().zip(&y.channels).map(|(x, y)| self.interval(*x, *y));
-                Shape::Vector(Vector::new(channels.collect::<SmallVec<[Interval; 4]>>()).at_most(
-                    if self.widen && y.length > x.length { f32::INFINITY } else { x.length.max(y.length) },
-                ))
+                Shape::Vector(
+                    Vector::new(channels.collect::<SmallVec<[Interval; 4]>>()).at_most(
+                        if self.widen && y.length > x.length { f32::INFINITY } else { x.length.max(y.length) },
+                    ),
+                )
             }
             (Shape::Record(x), Shape::Record(y)) => Shape::Record(Rc::new(self.records(x, y))),
             (Shape::Array(x), Shape::Array(y)) if x.len() == y.len() => {

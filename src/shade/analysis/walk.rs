@@ -102,9 +102,7 @@ pub(super) fn functions(ast: &AST) -> Functions {
         let parameters = function.params.iter().map(|name| (*name).to_owned()).collect();
         let is_typed = function.this_type.is_some();
         let entry = functions.entry((function.name.to_owned(), count));
-        entry
-            .and_modify(|other| other.is_typed = true)
-            .or_insert(ScriptFunction { parameters, body, is_typed });
+        entry.and_modify(|other| other.is_typed = true).or_insert(ScriptFunction { parameters, body, is_typed });
     }
     functions
 }
@@ -191,7 +189,11 @@ impl<'a> Walker<'a> {
     /// Counts the work; a walk that grows too long ends.
     pub fn step(&mut self, position: Position) -> Flow<()> {
         self.steps += 1;
-        if self.steps > MAX_STEPS { self.give_up(position, "a script that branches or loops this much") } else { Ok(()) }
+        if self.steps > MAX_STEPS {
+            self.give_up(position, "a script that branches or loops this much")
+        } else {
+            Ok(())
+        }
     }
 
     /// Whether a loop may still be walked round by round.
@@ -271,10 +273,7 @@ impl<'a> Walker<'a> {
     /// Joins all paths that got to one place; `None` if none did.
     pub fn join_exits(&mut self, exits: Exits, control: InputSet) -> Option<(Variables, Abstract)> {
         exits.states.into_iter().reduce(|(variables_a, value_a), (variables_b, value_b)| {
-            (
-                self.join_variables(&variables_a, &variables_b, control),
-                self.join_values(&value_a, &value_b, control),
-            )
+            (self.join_variables(&variables_a, &variables_b, control), self.join_values(&value_a, &value_b, control))
         })
     }
 

@@ -4,6 +4,7 @@ use super::super::document::Node;
 use super::super::format;
 use super::{Resolver, rgb};
 use crate::diag::Diagnostic;
+use crate::math::Vec3;
 use crate::scene::settings::{Background, Composition, FilterKind, LineSettings, RayKinds, RenderSettings};
 use crate::scene::texture::{Texture, TextureFilter, Wrap};
 
@@ -33,6 +34,10 @@ impl Resolver<'_> {
             samples: render.samples,
             seed: render.seed,
             background,
+            ambient: match render.ambient {
+                format::Ambient::Gray(level) => Vec3::splat(level as f32),
+                format::Ambient::Color(color) => rgb(color),
+            },
             filter: match render.filter {
                 format::Filter::Box => FilterKind::Box,
                 format::Filter::Tent => FilterKind::Tent,
