@@ -301,7 +301,7 @@ fn at_the_camera_both_compositions_are_one() {
 
 #[test]
 fn a_picture_without_samples_has_no_lines() {
-    assert_eq!(lines_of(&[], &settings()).samples, []);
+    assert_eq!(lines_of(&[], &settings()).samples, [0_u32; 0]);
     let off = LineSettings { max_width: 0.0, ..settings() };
     assert_eq!(stylists(&camera_lines(&[hit(1, 1.0, 3.0), MISS()], &off)), [None, None]);
 }
