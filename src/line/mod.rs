@@ -1,4 +1,4 @@
-//! The line pass: which line each sample sees. Pure image work on [`SampleBuffer`]s (OG18 section 3, DESIGN section 3).
+//! The line pass: which line each sample sees. Pure image work on [`SampleBuffer`](crate::sample::SampleBuffer)s (OG18 section 3, DESIGN section 3).
 //!
 //! `brute` is the definition as plain loops and the oracle for `search`, which gives the same bits much sooner.
 //!
@@ -75,7 +75,7 @@ pub struct SeenLine {
 pub struct LineBuffer {
     /// The pixels.
     pub rect: PixelRect,
-    /// Sample indices (as in the [`SampleBuffer`] of the same rectangle), rising.
+    /// Sample indices (as in the [`SampleBuffer`](crate::sample::SampleBuffer) of the same rectangle), rising.
     pub samples: Vec<u32>,
     /// The line of each.
     pub lines: Vec<SeenLine>,

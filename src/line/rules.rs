@@ -97,11 +97,12 @@ fn widened(half: f32, gap: f64) -> f32 {
     loop {
         let cube = s * s * s;
         let next = s - (s * cube - half * s - gap) / (4.0 * cube - half);
-        // Not falling any more, or not a number: as near as f64 comes.
-        if !(next < s) {
+        if next < s {
+            s = next;
+        } else {
+            // As near as f64 comes.
             return cube as f32;
         }
-        s = next;
     }
 }
 

@@ -26,8 +26,15 @@ pub(super) fn find(
     rules: &Rules,
     counts: &mut LineCounts,
 ) -> Vec<Found> {
-    let mut search =
-        Search { window, rules, tiles: Vec::new(), near_block: Vec::new(), near_pixel: Vec::new(), pairs_tested: 0 };
+    let mut search = Search {
+        window,
+        rules,
+        tiles: Vec::new(),
+        near_block: Vec::new(),
+        near_pixel: Vec::new(),
+        pixels: Vec::new(),
+        pairs_tested: 0,
+    };
     let mut found = Vec::new();
     search.collect_tiles(targets);
     if search.tiles.is_empty() {
@@ -48,7 +55,7 @@ pub(super) fn find(
                 if lined[targets.nodes.sample[row] as usize] {
                     continue;
                 }
-                if let Some(pair) = search.seen(&targets.node(pixel.pixel, row), previous) {
+                if let Some(pair) = search.seen(pixel, &targets.node(pixel.pixel, row), previous) {
                     found.push(Found { row, path: targets.nodes.path, pair });
                     previous = Some(pair);
                 }
@@ -67,6 +74,8 @@ struct Near<'w> {
     block: &'w Block,
     /// Smallest squared distance from the pixel of targets.
     distance_squared: f32,
+    /// Its pixels in [`Search::pixels`], once they have been sifted for the pixel of targets.
+    sifted: Option<(usize, usize)>,
 }
 
 /// Scratch of one search, narrowed from level to level.
@@ -79,6 +88,9 @@ struct Search<'w, 'a> {
     near_block: Vec<Near<'w>>,
     /// Those that may hold neighbours of the current pixel of targets, by best rank, then by distance.
     near_pixel: Vec<Near<'w>>,
+    /// Pixels of those blocks that may hold neighbours of the current pixel of targets, block by block, in each by best
+    /// rank.
+    pixels: Vec<&'w PixelNodes>,
     pairs_tested: u64,
 }
 
@@ -99,15 +111,14 @@ impl<'w> Search<'w, '_> {
             let bounds: &'w PathBounds = nodes.bounds;
             for block in &bounds.blocks {
                 if self.may_matter(&targets.rect, &targets.bounds, &block.rect, &block.bounds).is_some() {
-                    self.near_block.push(Near { tile, block, distance_squared: 0.0 });
+                    self.near_block.push(Near { tile, block, distance_squared: 0.0, sifted: None });
                 }
             }
         }
     }
 
     fn collect_for_pixel(&mut self, targets: &PixelNodes) {
-        let [x, y] = targets.pixel;
-        let rect = PixelRect { x0: x, y0: y, x1: x + 1, y1: y + 1 };
+        let rect = pixel_rect(targets.pixel);
         let mut near = std::mem::take(&mut self.near_pixel);
         near.clear();
         for &candidate in &self.near_block {
@@ -121,6 +132,31 @@ impl<'w> Search<'w, '_> {
             by_rank.then(a.distance_squared.total_cmp(&b.distance_squared))
         });
         self.near_pixel = near;
+        self.pixels.clear();
+    }
+
+    /// The pixels of a near block that may hold neighbours of the pixel of targets, as a range of [`Self::pixels`].
+    ///
+    /// Sifted when the first target asks: for most pixels of targets, ranks and distances found so far cut off most
+    /// blocks before.
+    fn sifted(&mut self, near: usize, targets: &PixelNodes) -> (usize, usize) {
+        let Near { tile, block, sifted, .. } = self.near_pixel[near];
+        if let Some(range) = sifted {
+            return range;
+        }
+        let first = self.pixels.len();
+        if let Some(nodes) = &self.window.tiles[tile] {
+            let bounds: &'w PathBounds = nodes.bounds;
+            for pixel in bounds.pixels(block) {
+                let [target, neighbor] = [targets.pixel, pixel.pixel].map(pixel_rect);
+                if self.may_matter(&target, &targets.bounds, &neighbor, &pixel.bounds).is_some() {
+                    self.pixels.push(pixel);
+                }
+            }
+        }
+        let range = (first, self.pixels.len());
+        self.near_pixel[near].sifted = Some(range);
+        range
     }
 
     /// The smallest squared distance between targets and neighbours of two rectangles, if they may make lines.
@@ -138,21 +174,21 @@ impl<'w> Search<'w, '_> {
     }
 
     /// The pair that a target sees.
-    fn seen(&mut self, t: &LineNode, guess: Option<Pair>) -> Option<Pair> {
+    fn seen(&mut self, targets: &PixelNodes, t: &LineNode, guess: Option<Pair>) -> Option<Pair> {
         let as_bounds = Bounds::of_node(&t.features, t.rank, t.radius_squared);
         let mut best = None;
         if let Some(Pair { tile, pixel, row, .. }) = guess {
             self.test(t, tile, pixel, row, &mut best);
         }
-        self.search_outranking(t, &as_bounds, &mut best);
+        self.search_outranking(targets, t, &as_bounds, &mut best);
         if best.is_none_or(|pair: Pair| pair.own) && t.radius_squared > 0.0 {
-            self.search_nearest(t, &as_bounds, &mut best);
+            self.search_nearest(targets, t, &as_bounds, &mut best);
         }
         best
     }
 
     /// Looks for the highest-ranking valid pair whose neighbour outranks the target.
-    fn search_outranking(&mut self, t: &LineNode, as_bounds: &Bounds, best: &mut Option<Pair>) {
+    fn search_outranking(&mut self, targets: &PixelNodes, t: &LineNode, as_bounds: &Bounds, best: &mut Option<Pair>) {
         let tests = self.rules.tests();
         for i in 0..self.near_pixel.len() {
             let Near { tile, block, .. } = self.near_pixel[i];
@@ -165,11 +201,13 @@ impl<'w> Search<'w, '_> {
                 continue;
             }
             let Some(nodes) = &self.window.tiles[tile] else { continue };
-            for pixel in nodes.bounds.pixels(block) {
+            let (first, end) = self.sifted(i, targets);
+            for pixel in first..end {
+                let pixel = self.pixels[pixel];
                 if !may_win(t, best, pixel.bounds.best) {
                     break;
                 }
-                let distance = pixel_distance_squared(t, pixel.pixel);
+                let distance = target_distance_squared(t, &pixel_rect(pixel.pixel));
                 if distance >= pixel.bounds.radius_squared
                     || loses_by_distance(best, pixel.bounds.best, distance)
                     || !as_bounds.may_differ(&pixel.bounds, tests)
@@ -186,14 +224,14 @@ impl<'w> Search<'w, '_> {
     }
 
     /// Looks for the nearest neighbour that differs and does not outrank the target.
-    fn search_nearest(&mut self, t: &LineNode, as_bounds: &Bounds, best: &mut Option<Pair>) {
+    fn search_nearest(&mut self, targets: &PixelNodes, t: &LineNode, as_bounds: &Bounds, best: &mut Option<Pair>) {
         let tests = self.rules.tests();
         let too_far = |best: &Option<Pair>, distance: f32| match best {
             Some(pair) => distance > pair.distance_squared,
             None => distance >= t.radius_squared,
         };
         for i in 0..self.near_pixel.len() {
-            let Near { tile, block, distance_squared } = self.near_pixel[i];
+            let Near { tile, block, distance_squared, .. } = self.near_pixel[i];
             if too_far(best, distance_squared)
                 || block.bounds.worst.outranks(t.rank)
                 || too_far(best, target_distance_squared(t, &block.rect))
@@ -201,9 +239,10 @@ impl<'w> Search<'w, '_> {
             {
                 continue;
             }
-            let Some(nodes) = &self.window.tiles[tile] else { continue };
-            for pixel in nodes.bounds.pixels(block) {
-                if too_far(best, pixel_distance_squared(t, pixel.pixel))
+            let (first, end) = self.sifted(i, targets);
+            for pixel in first..end {
+                let pixel = self.pixels[pixel];
+                if too_far(best, target_distance_squared(t, &pixel_rect(pixel.pixel)))
                     || pixel.bounds.worst.outranks(t.rank)
                     || !as_bounds.may_differ(&pixel.bounds, tests)
                 {
@@ -272,8 +311,6 @@ fn target_distance_squared(t: &LineNode, rect: &PixelRect) -> f32 {
     x * x + y * y
 }
 
-/// [`target_distance_squared`] to one pixel.
-#[inline]
-fn pixel_distance_squared(t: &LineNode, pixel: [i32; 2]) -> f32 {
-    target_distance_squared(t, &PixelRect { x0: pixel[0], y0: pixel[1], x1: pixel[0] + 1, y1: pixel[1] + 1 })
+fn pixel_rect([x, y]: [i32; 2]) -> PixelRect {
+    PixelRect { x0: x, y0: y, x1: x + 1, y1: y + 1 }
 }
