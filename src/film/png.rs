@@ -13,7 +13,7 @@
 //! `rgba` and `color` have an alpha channel if the settings say so. Colours are stored premultiplied on the film and
 //! divided by alpha for PNG, as its standard asks.
 
-use std::io::{self, Write};
+use std::io::{self, ErrorKind, Write};
 use std::ops::Range;
 
 use png::{BitDepth, ColorType, Encoder, EncodingError, SrgbRenderingIntent};
@@ -44,6 +44,13 @@ impl PngFormat {
             Diagnostic::error(format!("a PNG of layer `{layer}` was asked for, but that layer is not rendered"))
                 .hint(format!("rendered are {}", layers.join(", ")))
         })?;
+        // PNG allows Latin-1, of which ASCII is the part that nobody reads wrongly.
+        let is_keyword = |name: &str| (1..80).contains(&name.len()) && name.bytes().all(|b| (b' '..=b'~').contains(&b));
+        if let Some((name, _)) = settings.metadata.iter().find(|(name, _)| !is_keyword(name)) {
+            return Err(Diagnostic::error(format!(
+                "cannot make a PNG file of this picture: the keyword {name:?} is not 1 to 79 ASCII letters"
+            )));
+        }
         let start = settings.layers[..place].iter().map(|layer| layer.channels().len()).sum();
         let alpha = match layer {
             Layer::Rgba | Layer::Color => settings.transparent,
@@ -103,6 +110,10 @@ impl PngFormat {
 
     /// Writes the file, one row of blocks after another. Blocks that are not there are transparent black.
     pub(super) fn write(&self, blocks: &mut Blocks, sink: &mut dyn Write) -> io::Result<()> {
+        watched(sink, |sink| self.encode(blocks, sink))
+    }
+
+    fn encode(&self, blocks: &mut Blocks, sink: &mut dyn Write) -> io::Result<()> {
         let mut encoder = Encoder::new(sink, self.crop.width(), self.crop.height());
         encoder.set_color(if self.alpha { ColorType::Rgba } else { ColorType::Rgb });
         encoder.set_depth(BitDepth::Eight);
@@ -168,13 +179,53 @@ fn id_color(id: u32) -> [f32; 3] {
 
 /// Writes a small picture of encoded colours, 0 … 1.
 pub(super) fn write_small(sink: &mut dyn Write, size: [u32; 2], pixels: &[[f32; 3]]) -> io::Result<()> {
-    let mut encoder = Encoder::new(sink, size[0], size[1]);
-    encoder.set_color(ColorType::Rgb);
-    encoder.set_depth(BitDepth::Eight);
-    let bytes: Vec<u8> = pixels.iter().flatten().map(|value| byte(*value)).collect();
-    let mut writer = encoder.write_header().map_err(io_error)?;
-    writer.write_image_data(&bytes).map_err(io_error)?;
-    writer.finish().map_err(io_error)
+    watched(sink, |sink| {
+        let mut encoder = Encoder::new(sink, size[0], size[1]);
+        encoder.set_color(ColorType::Rgb);
+        encoder.set_depth(BitDepth::Eight);
+        let bytes: Vec<u8> = pixels.iter().flatten().map(|value| byte(*value)).collect();
+        let mut writer = encoder.write_header().map_err(io_error)?;
+        writer.write_image_data(&bytes).map_err(io_error)?;
+        writer.finish().map_err(io_error)
+    })
+}
+
+/// Runs an encoder so that no failure of the sink gets lost: the `png` crate writes the last piece of pixels in a
+/// destructor, which tells nobody, and wraps other failures until their cause cannot be seen.
+fn watched(sink: &mut dyn Write, encode: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
+    let mut watched = Watched { sink, failure: None };
+    let result = encode(&mut watched);
+    watched.failure.map_or(result, Err)
+}
+
+struct Watched<'a> {
+    sink: &'a mut dyn Write,
+    /// The first failure.
+    failure: Option<io::Error>,
+}
+
+impl Watched<'_> {
+    fn note<T>(&mut self, result: io::Result<T>) -> io::Result<T> {
+        result.map_err(|error| {
+            let kind = error.kind();
+            if kind != ErrorKind::Interrupted {
+                self.failure.get_or_insert(error);
+            }
+            kind.into()
+        })
+    }
+}
+
+impl Write for Watched<'_> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let result = self.sink.write(bytes);
+        self.note(result)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        let result = self.sink.flush();
+        self.note(result)
+    }
 }
 
 fn io_error(error: EncodingError) -> io::Error {
