@@ -24,6 +24,7 @@ pub(super) const GROUP: usize = 4;
 pub struct Filter {
     kind: FilterKind,
     radius: f32,
+    reach: i32,
     /// For each step of the offset, for each group of pixels in reach: the weights at the start of the step, and their
     /// rise over it. The pixels go from −reach to +reach; the last group is filled up with weights of 0.
     rows: Vec<[Vec4; 2]>,
@@ -38,8 +39,9 @@ impl Filter {
     pub fn new(kind: FilterKind, radius: f32) -> Self {
         let steps = STEPS as f32;
         let radius = (radius.min(Self::MAX_RADIUS) * steps).round().max(1.0) / steps;
-        let mut filter = Self { kind, radius, rows: Vec::new() };
-        let reach = filter.reach() as usize;
+        let reach = (radius - 0.5).ceil().max(0.0) as i32;
+        let mut filter = Self { kind, radius, reach, rows: Vec::new() };
+        let reach = reach as usize;
         for step in 0..STEPS {
             for group in 0..filter.groups() {
                 let weights = [0, 1, 2, 3].map(|lane| {
@@ -82,23 +84,22 @@ impl Filter {
     pub fn weight(&self, x: f32) -> f32 {
         // The sample's pixel and its offset in that.
         let pixel = (x + 0.5).floor();
-        let reach = self.reach();
-        if pixel.is_nan() || pixel.abs() > reach as f32 {
+        if pixel.is_nan() || pixel.abs() > self.reach as f32 {
             return 0.0;
         }
-        let place = (reach - pixel as i32) as usize;
+        let place = (self.reach - pixel as i32) as usize;
         self.weights(x + 0.5 - pixel).nth(place / GROUP).map_or(0.0, |weights| weights[place % GROUP])
     }
 
     /// How many whole pixels around a pixel hold samples that can reach it.
     #[must_use]
     pub fn reach(&self) -> i32 {
-        (self.radius - 0.5).ceil().max(0.0) as i32
+        self.reach
     }
 
     /// Groups of weights in a row.
     pub(super) fn groups(&self) -> usize {
-        (2 * self.reach() as usize + 1).div_ceil(GROUP)
+        (2 * self.reach as usize + 1).div_ceil(GROUP)
     }
 
     /// The weights of a sample for the pixels from −reach to +reach around its own, in groups; `offset` is its place

@@ -34,6 +34,7 @@ pub(super) struct PngFormat {
     crop: PixelRect,
     whole: bool,
     metadata: Vec<(String, String)>,
+    srgb: SrgbBytes,
 }
 
 impl PngFormat {
@@ -64,6 +65,7 @@ impl PngFormat {
             crop: settings.crop,
             whole: settings.crop == PixelRect::of_size(settings.size),
             metadata: settings.metadata.clone(),
+            srgb: SrgbBytes::new(),
         })
     }
 
@@ -80,27 +82,26 @@ impl PngFormat {
         for i in 0..count {
             let mut value = [0.0; 4];
             value.iter_mut().zip(channels).for_each(|(value, channel)| *value = channel[i]);
-            let shown = self.show(value).map(byte);
-            bytes.extend_from_slice(&shown[..self.pixel_bytes()]);
+            bytes.extend_from_slice(&self.show(value)[..self.pixel_bytes()]);
         }
         bytes
     }
 
-    /// The encoded components, 0 … 1, of a pixel with these channels.
-    fn show(&self, [x, y, z, w]: [f32; 4]) -> [f32; 4] {
+    /// What a pixel with these channels looks like.
+    fn show(&self, [x, y, z, w]: [f32; 4]) -> [u8; 4] {
         let [r, g, b] = match &self.layer {
             _ if self.alpha => {
-                let share = |premultiplied: f32| if w > 0.0 { srgb_from_linear(premultiplied / w) } else { 0.0 };
-                return [share(x), share(y), share(z), w];
+                let share = |premultiplied: f32| if w > 0.0 { self.srgb.byte(premultiplied / w) } else { 0 };
+                return [share(x), share(y), share(z), byte(w)];
             }
-            Layer::Normal if [x, y, z] == [0.0; 3] => [0.0; 3],
-            Layer::Normal => [x, y, z].map(|component| component * 0.5 + 0.5),
-            Layer::Position | Layer::Uv => [x, y, z].map(|coordinate| coordinate - coordinate.floor()),
-            Layer::Depth => [1.0 / (1.0 + x); 3],
-            Layer::Object => id_color(x.to_bits()),
-            _ => [x, y, z].map(srgb_from_linear),
+            Layer::Normal if [x, y, z] == [0.0; 3] => [0; 3],
+            Layer::Normal => [x, y, z].map(|component| byte(component * 0.5 + 0.5)),
+            Layer::Position | Layer::Uv => [x, y, z].map(|coordinate| byte(coordinate - coordinate.floor())),
+            Layer::Depth => [byte(1.0 / (1.0 + x)); 3],
+            Layer::Object => id_color(x.to_bits()).map(byte),
+            _ => [x, y, z].map(|linear| self.srgb.byte(linear)),
         };
-        [r, g, b, 1.0]
+        [r, g, b, u8::MAX]
     }
 
     /// A block as it waits for the end: unpacked, since PNG is compressed across blocks.
@@ -159,8 +160,33 @@ impl PngFormat {
 }
 
 /// A value 0 … 1 to the nearest byte; what is outside is clamped.
-pub(super) fn byte(value: f32) -> u8 {
+fn byte(value: f32) -> u8 {
     (value.clamp(0.0, 1.0) * 255.0 + 0.5) as u8
+}
+
+/// [`srgb_from_linear`] to the nearest byte, several times as fast: for each byte but 0 the least value that gives it.
+struct SrgbBytes {
+    least: [f32; 255],
+}
+
+impl SrgbBytes {
+    fn new() -> Self {
+        let least = |i: usize| {
+            // Positive floats are in the order of their bits.
+            let (mut below, mut at) = (0, 1.0_f32.to_bits());
+            while at - below > 1 {
+                let middle = below.midpoint(at);
+                let reached = usize::from(byte(srgb_from_linear(f32::from_bits(middle)))) > i;
+                if reached { at = middle } else { below = middle }
+            }
+            f32::from_bits(at)
+        };
+        Self { least: std::array::from_fn(least) }
+    }
+
+    fn byte(&self, linear: f32) -> u8 {
+        self.least.partition_point(|least| *least <= linear) as u8
+    }
 }
 
 /// A colour for an id, bright enough to tell from the black of a miss.
@@ -232,5 +258,20 @@ fn io_error(error: EncodingError) -> io::Error {
     match error {
         EncodingError::IoError(error) => error,
         error => io::Error::other(error.to_string()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn srgb_bytes_are_the_nearest() {
+        let srgb = SrgbBytes::new();
+        for i in 0..100_000 {
+            let linear = i as f32 * 1.1e-5 - 0.05;
+            assert_eq!(srgb.byte(linear), byte(srgb_from_linear(linear)), "{linear}");
+        }
+        assert_eq!([f32::NAN, f32::NEG_INFINITY, f32::INFINITY].map(|value| srgb.byte(value)), [0, 0, 255]);
     }
 }

@@ -1,4 +1,4 @@
-//! The weighted sums of a rectangle of pixels: the arithmetic under [`super::develop`].
+//! The weighted sums of a rectangle of pixels: the arithmetic under [`super::develop()`].
 //!
 //! A *tap* is a target pixel's place relative to a source pixel, from −reach to +reach along each axis. Rows of taps
 //! are padded to whole groups of four with weights of 0, so that one group is one SIMD register. The sums have as many
