@@ -101,3 +101,45 @@ impl Target {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn failures_name_the_file_and_the_cause() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.exr");
+        let target = Target::new(&path).unwrap();
+        let (file, place) = (path.display(), folder.path().display());
+        for (kind, message) in [
+            (ErrorKind::StorageFull, "the disk is full (free some space and try again)".to_owned()),
+            (ErrorKind::QuotaExceeded, "the disk quota is used up (free some space and try again)".to_owned()),
+            (
+                ErrorKind::PermissionDenied,
+                format!("no permission to create files in `{place}` (choose another folder)"),
+            ),
+            (ErrorKind::ReadOnlyFilesystem, "the disk is read-only (choose another folder)".to_owned()),
+            (ErrorKind::BrokenPipe, "broken pipe".to_owned()),
+        ] {
+            let failure = target.failure(&kind.into()).to_string();
+            assert_eq!(failure, format!("{file}: error: cannot write this file: {message}"));
+        }
+    }
+
+    #[test]
+    fn a_file_appears_whole_or_not_at_all() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.txt");
+        write_atomically(&path, |sink| sink.write_all(b"first")).unwrap();
+        let error = write_atomically(&path, |sink| {
+            sink.write_all(b"second")?;
+            Err(ErrorKind::StorageFull.into())
+        });
+        assert_eq!(error.unwrap_err().message, "cannot write this file: the disk is full");
+        assert_eq!(fs::read_to_string(&path).unwrap(), "first");
+        write_atomically(&path, |sink| sink.write_all(b"third")).unwrap();
+        assert_eq!(fs::read_to_string(&path).unwrap(), "third");
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+}

@@ -161,13 +161,67 @@ impl Blocks {
         self.spool.read_exact(&mut packed)?;
         Ok(Some(packed))
     }
-
-    #[cfg(test)]
-    pub(super) fn waiting_bytes(&self) -> usize {
-        self.partial.values().map(|partial| partial.bytes.len()).sum()
-    }
 }
 
 fn blocks_along(pixels: u32) -> usize {
     pixels.div_ceil(SIDE as u32) as usize
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Cursor;
+
+    use super::*;
+
+    /// The most bytes that waited while strips of tiles ran down a picture, one after another.
+    fn most_waiting(size: [u32; 2], tile: i32) -> usize {
+        let picture = PixelRect::of_size(size);
+        let mut blocks = Blocks::new(picture, vec![2, 4], Box::new(Cursor::new(Vec::new())));
+        let mut most = 0;
+        for x0 in (0..picture.x1).step_by(tile as usize) {
+            for y0 in (0..picture.y1).step_by(tile as usize) {
+                let rect = PixelRect { x0, y0, x1: x0 + tile, y1: y0 + tile }.intersection(&picture);
+                let planes = [2, 4].map(|size| vec![7; rect.pixels() * size]);
+                for block in blocks.put(rect, &planes).unwrap() {
+                    assert!(block.bytes.iter().all(|byte| *byte == 7));
+                    blocks.store(block.index, &block.bytes).unwrap();
+                }
+                most = most.max(blocks.partial.values().map(|partial| partial.bytes.len()).sum());
+            }
+        }
+        assert_eq!(stored(&mut blocks), picture.pixels() * 6);
+        most
+    }
+
+    fn stored(blocks: &mut Blocks) -> usize {
+        (0..blocks.count()).map(|index| blocks.load(index).unwrap().unwrap().len()).sum()
+    }
+
+    #[test]
+    fn what_waits_grows_with_the_short_side_alone() {
+        for tile in [8, 32, 100] {
+            let short = most_waiting([500, 200], tile);
+            assert_eq!(most_waiting([1000, 200], tile), short);
+            // At most two blocks across a strip's border, all along it.
+            assert!(short <= 2 * 200_usize.next_multiple_of(64) * 64 * 6, "{short}");
+        }
+        assert_eq!(most_waiting([500, 200], 64), 0);
+    }
+
+    #[test]
+    fn pixels_that_come_twice_are_told() {
+        let new = || Blocks::new(PixelRect::of_size([100, 100]), vec![1], Box::new(Cursor::new(Vec::new())));
+        let put =
+            |blocks: &mut Blocks, rect: PixelRect| blocks.put(rect, &[vec![1; rect.pixels()]]).map(|full| full.len());
+        let mut blocks = new();
+        let part = PixelRect::of_size([50, 50]);
+        assert_eq!(put(&mut blocks, part), Ok(0));
+        assert_eq!(put(&mut blocks, PixelRect::of_size([64, 64])), Err(Twice));
+
+        let mut blocks = new();
+        let full = blocks.put(PixelRect::of_size([64, 64]), &[vec![1; 4096]]).unwrap();
+        blocks.store(full[0].index, &full[0].bytes).unwrap();
+        assert_eq!(put(&mut blocks, part), Err(Twice));
+        assert_eq!(put(&mut blocks, PixelRect { x0: 200, y0: 0, x1: 300, y1: 9 }), Ok(0));
+    }
 }

@@ -1,7 +1,7 @@
 //! Film: samples and their lines through the pixel filter into layers, and layers into files.
 //!
 //! [`develop`](develop()) turns the samples around a rectangle into a [`FilmTile`]; an [`Output`] takes tiles as they
-//! finish, in any order and from any thread, and holds only what does not yet fill a block of its file; [`compare`]
+//! finish, in any order and from any thread, and holds only what does not yet fill a block of its file; [`compare`](mod@compare)
 //! reads pictures back and tells how they differ. Nothing here knows of scenes, rays or scripts.
 
 mod atomic;

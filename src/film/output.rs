@@ -61,7 +61,8 @@ impl Output {
     ///
     /// # Errors
     /// If the extension is not known, the folder is missing or cannot be written to, the path is not that of a plain
-    /// file, a layer is asked for twice, or a PNG shows a layer that is not among the layers.
+    /// file, the crop is empty, a layer is asked for twice, a PNG shows a layer that is not among the layers, or the
+    /// format cannot hold a name.
     pub fn create(settings: OutputSettings) -> Result<Self, Diagnostic> {
         let format = Format::new(&settings)?;
         let target = Target::new(&settings.path)?;
@@ -154,6 +155,9 @@ impl Format {
         {
             return Err(in_file(Diagnostic::error(format!("layer `{}` is asked for twice", twice.1))));
         }
+        if settings.crop.pixels() == 0 {
+            return Err(in_file(Diagnostic::error("the part of the picture to write has no pixels")));
+        }
         let extension = settings.path.extension().map(|extension| extension.to_string_lossy().to_lowercase());
         match extension.as_deref() {
             Some("exr") => ExrFormat::new(settings).map(|exr| Self::Exr(Box::new(exr))),
@@ -190,5 +194,129 @@ impl Format {
             Self::Exr(exr) => exr.write(blocks, sink),
             Self::Png(png) => png.write(blocks, sink),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+    use std::io::{Cursor, ErrorKind, Read, Seek, SeekFrom};
+    use std::path::Path;
+
+    use super::*;
+
+    /// A disk that is full after so many bytes.
+    struct Full<W> {
+        inner: W,
+        room: usize,
+    }
+
+    impl<W: Write> Write for Full<W> {
+        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+            if bytes.len() > self.room {
+                return Err(ErrorKind::StorageFull.into());
+            }
+            self.room -= bytes.len();
+            self.inner.write(bytes)
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            self.inner.flush()
+        }
+    }
+
+    impl<W: Read> Read for Full<W> {
+        fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
+            self.inner.read(bytes)
+        }
+    }
+
+    impl<W: Seek> Seek for Full<W> {
+        fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+            self.inner.seek(to)
+        }
+    }
+
+    const SIZE: [u32; 2] = [256, 128];
+
+    /// An output over an old file, on a disk with this much room for what waits.
+    fn output(folder: &tempfile::TempDir, name: &str, room: usize) -> (PathBuf, Output) {
+        let path = folder.path().join(name);
+        fs::write(&path, "old").unwrap();
+        let settings = OutputSettings {
+            path: path.clone(),
+            size: SIZE,
+            crop: PixelRect::of_size(SIZE),
+            layers: vec![Layer::Rgba, Layer::Depth],
+            png_layer: Layer::Rgba,
+            transparent: false,
+            metadata: Vec::new(),
+        };
+        let (format, target) = (Format::new(&settings).unwrap(), Target::new(&path).unwrap());
+        (path, Output::new(settings, format, target, Box::new(Full { inner: Cursor::new(Vec::new()), room })))
+    }
+
+    fn tile(rect: PixelRect) -> FilmTile {
+        // Values that do not compress.
+        let noise = |i: u32| {
+            let bits = (i ^ i >> 7).wrapping_mul(0x9E37_79B9);
+            (bits ^ bits >> 15).wrapping_mul(0x85EB_CA6B) as f32 / 4_294_967_296.0
+        };
+        let channel = |c: u32| (0..rect.pixels() as u32).map(move |i| noise(i * 5 + c)).collect();
+        FilmTile { rect, channels: (0..5).map(channel).collect() }
+    }
+
+    fn check_old_survives(folder: &tempfile::TempDir, path: &Path, error: &Diagnostic) {
+        let message = format!("{}: error: cannot write this file: the disk is full", path.display());
+        assert_eq!(error.to_string(), format!("{message} (free some space and try again)"));
+        assert_eq!(fs::read_to_string(path).unwrap(), "old");
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn the_old_file_survives_a_disk_that_fills_while_writing() {
+        for name in ["a.exr", "a.png"] {
+            let folder = tempfile::tempdir().unwrap();
+            let (path, output) = output(&folder, name, 20_000);
+            let error = output.write(&tile(PixelRect::of_size(SIZE))).unwrap_err();
+            check_old_survives(&folder, &path, &error);
+            assert_eq!(output.write(&tile(PixelRect::of_size(SIZE))).unwrap_err(), error);
+            assert_eq!(output.finish().unwrap_err(), error);
+            check_old_survives(&folder, &path, &error);
+        }
+    }
+
+    #[test]
+    fn the_old_file_survives_a_disk_that_fills_at_the_end() {
+        for name in ["a.exr", "a.png"] {
+            // With and without unwritten blocks to fill in.
+            for part in [SIZE, [100, 100]] {
+                let begun = || {
+                    let folder = tempfile::tempdir().unwrap();
+                    let (path, output) = output(&folder, name, usize::MAX);
+                    output.write(&tile(PixelRect::of_size(part))).unwrap();
+                    (folder, path, output)
+                };
+                let (_folder, path, output) = begun();
+                output.finish().unwrap();
+                let length = fs::metadata(path).unwrap().len() as usize;
+                assert!(length > 20_000, "{name} of {length} bytes");
+                for room in (0..length).step_by(length / 12).chain([length - 1, length - 13]) {
+                    let (folder, path, output) = begun();
+                    let result = output.finish_through(|sink| Box::new(Full { inner: sink, room }));
+                    let error = result.expect_err(&format!("{name}, {room} of {length} bytes"));
+                    check_old_survives(&folder, &path, &error);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_old_file_survives_when_only_the_last_blocks_fail() {
+        let folder = tempfile::tempdir().unwrap();
+        let (path, output) = output(&folder, "a.exr", 10);
+        output.write(&tile(PixelRect::of_size([10, 10]))).unwrap();
+        let error = output.finish().unwrap_err();
+        check_old_survives(&folder, &path, &error);
     }
 }

@@ -13,7 +13,7 @@
 //! `rgba` and `color` have an alpha channel if the settings say so. Colours are stored premultiplied on the film and
 //! divided by alpha for PNG, as its standard asks.
 
-use std::io::{self, Write};
+use std::io::{self, ErrorKind, Write};
 use std::ops::Range;
 
 use png::{BitDepth, ColorType, Encoder, EncodingError, SrgbRenderingIntent};
@@ -34,6 +34,7 @@ pub(super) struct PngFormat {
     crop: PixelRect,
     whole: bool,
     metadata: Vec<(String, String)>,
+    srgb: SrgbBytes,
 }
 
 impl PngFormat {
@@ -44,6 +45,13 @@ impl PngFormat {
             Diagnostic::error(format!("a PNG of layer `{layer}` was asked for, but that layer is not rendered"))
                 .hint(format!("rendered are {}", layers.join(", ")))
         })?;
+        // PNG allows Latin-1, of which ASCII is the part that nobody reads wrongly.
+        let is_keyword = |name: &str| (1..80).contains(&name.len()) && name.bytes().all(|b| (b' '..=b'~').contains(&b));
+        if let Some((name, _)) = settings.metadata.iter().find(|(name, _)| !is_keyword(name)) {
+            return Err(Diagnostic::error(format!(
+                "cannot make a PNG file of this picture: the keyword {name:?} is not 1 to 79 ASCII letters"
+            )));
+        }
         let start = settings.layers[..place].iter().map(|layer| layer.channels().len()).sum();
         let alpha = match layer {
             Layer::Rgba | Layer::Color => settings.transparent,
@@ -57,6 +65,7 @@ impl PngFormat {
             crop: settings.crop,
             whole: settings.crop == PixelRect::of_size(settings.size),
             metadata: settings.metadata.clone(),
+            srgb: SrgbBytes::new(),
         })
     }
 
@@ -73,27 +82,26 @@ impl PngFormat {
         for i in 0..count {
             let mut value = [0.0; 4];
             value.iter_mut().zip(channels).for_each(|(value, channel)| *value = channel[i]);
-            let shown = self.show(value).map(byte);
-            bytes.extend_from_slice(&shown[..self.pixel_bytes()]);
+            bytes.extend_from_slice(&self.show(value)[..self.pixel_bytes()]);
         }
         bytes
     }
 
-    /// The encoded components, 0 … 1, of a pixel with these channels.
-    fn show(&self, [x, y, z, w]: [f32; 4]) -> [f32; 4] {
+    /// What a pixel with these channels looks like.
+    fn show(&self, [x, y, z, w]: [f32; 4]) -> [u8; 4] {
         let [r, g, b] = match &self.layer {
             _ if self.alpha => {
-                let share = |premultiplied: f32| if w > 0.0 { srgb_from_linear(premultiplied / w) } else { 0.0 };
-                return [share(x), share(y), share(z), w];
+                let share = |premultiplied: f32| if w > 0.0 { self.srgb.byte(premultiplied / w) } else { 0 };
+                return [share(x), share(y), share(z), byte(w)];
             }
-            Layer::Normal if [x, y, z] == [0.0; 3] => [0.0; 3],
-            Layer::Normal => [x, y, z].map(|component| component * 0.5 + 0.5),
-            Layer::Position | Layer::Uv => [x, y, z].map(|coordinate| coordinate - coordinate.floor()),
-            Layer::Depth => [1.0 / (1.0 + x); 3],
-            Layer::Object => id_color(x.to_bits()),
-            _ => [x, y, z].map(srgb_from_linear),
+            Layer::Normal if [x, y, z] == [0.0; 3] => [0; 3],
+            Layer::Normal => [x, y, z].map(|component| byte(component * 0.5 + 0.5)),
+            Layer::Position | Layer::Uv => [x, y, z].map(|coordinate| byte(coordinate - coordinate.floor())),
+            Layer::Depth => [byte(1.0 / (1.0 + x)); 3],
+            Layer::Object => id_color(x.to_bits()).map(byte),
+            _ => [x, y, z].map(|linear| self.srgb.byte(linear)),
         };
-        [r, g, b, 1.0]
+        [r, g, b, u8::MAX]
     }
 
     /// A block as it waits for the end: unpacked, since PNG is compressed across blocks.
@@ -103,6 +111,10 @@ impl PngFormat {
 
     /// Writes the file, one row of blocks after another. Blocks that are not there are transparent black.
     pub(super) fn write(&self, blocks: &mut Blocks, sink: &mut dyn Write) -> io::Result<()> {
+        watched(sink, |sink| self.encode(blocks, sink))
+    }
+
+    fn encode(&self, blocks: &mut Blocks, sink: &mut dyn Write) -> io::Result<()> {
         let mut encoder = Encoder::new(sink, self.crop.width(), self.crop.height());
         encoder.set_color(if self.alpha { ColorType::Rgba } else { ColorType::Rgb });
         encoder.set_depth(BitDepth::Eight);
@@ -148,8 +160,33 @@ impl PngFormat {
 }
 
 /// A value 0 … 1 to the nearest byte; what is outside is clamped.
-pub(super) fn byte(value: f32) -> u8 {
+fn byte(value: f32) -> u8 {
     (value.clamp(0.0, 1.0) * 255.0 + 0.5) as u8
+}
+
+/// [`srgb_from_linear`] to the nearest byte, several times as fast: for each byte but 0 the least value that gives it.
+struct SrgbBytes {
+    least: [f32; 255],
+}
+
+impl SrgbBytes {
+    fn new() -> Self {
+        let least = |i: usize| {
+            // Positive floats are in the order of their bits.
+            let (mut below, mut at) = (0, 1.0_f32.to_bits());
+            while at - below > 1 {
+                let middle = below.midpoint(at);
+                let reached = usize::from(byte(srgb_from_linear(f32::from_bits(middle)))) > i;
+                if reached { at = middle } else { below = middle }
+            }
+            f32::from_bits(at)
+        };
+        Self { least: std::array::from_fn(least) }
+    }
+
+    fn byte(&self, linear: f32) -> u8 {
+        self.least.partition_point(|least| *least <= linear) as u8
+    }
 }
 
 /// A colour for an id, bright enough to tell from the black of a miss.
@@ -168,18 +205,73 @@ fn id_color(id: u32) -> [f32; 3] {
 
 /// Writes a small picture of encoded colours, 0 … 1.
 pub(super) fn write_small(sink: &mut dyn Write, size: [u32; 2], pixels: &[[f32; 3]]) -> io::Result<()> {
-    let mut encoder = Encoder::new(sink, size[0], size[1]);
-    encoder.set_color(ColorType::Rgb);
-    encoder.set_depth(BitDepth::Eight);
-    let bytes: Vec<u8> = pixels.iter().flatten().map(|value| byte(*value)).collect();
-    let mut writer = encoder.write_header().map_err(io_error)?;
-    writer.write_image_data(&bytes).map_err(io_error)?;
-    writer.finish().map_err(io_error)
+    watched(sink, |sink| {
+        let mut encoder = Encoder::new(sink, size[0], size[1]);
+        encoder.set_color(ColorType::Rgb);
+        encoder.set_depth(BitDepth::Eight);
+        let bytes: Vec<u8> = pixels.iter().flatten().map(|value| byte(*value)).collect();
+        let mut writer = encoder.write_header().map_err(io_error)?;
+        writer.write_image_data(&bytes).map_err(io_error)?;
+        writer.finish().map_err(io_error)
+    })
+}
+
+/// Runs an encoder so that no failure of the sink gets lost: the `png` crate writes the last piece of pixels in a
+/// destructor, which tells nobody, and wraps other failures until their cause cannot be seen.
+fn watched(sink: &mut dyn Write, encode: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> io::Result<()> {
+    let mut watched = Watched { sink, failure: None };
+    let result = encode(&mut watched);
+    watched.failure.map_or(result, Err)
+}
+
+struct Watched<'a> {
+    sink: &'a mut dyn Write,
+    /// The first failure.
+    failure: Option<io::Error>,
+}
+
+impl Watched<'_> {
+    fn note<T>(&mut self, result: io::Result<T>) -> io::Result<T> {
+        result.map_err(|error| {
+            let kind = error.kind();
+            if kind != ErrorKind::Interrupted {
+                self.failure.get_or_insert(error);
+            }
+            kind.into()
+        })
+    }
+}
+
+impl Write for Watched<'_> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let result = self.sink.write(bytes);
+        self.note(result)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        let result = self.sink.flush();
+        self.note(result)
+    }
 }
 
 fn io_error(error: EncodingError) -> io::Error {
     match error {
         EncodingError::IoError(error) => error,
         error => io::Error::other(error.to_string()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn srgb_bytes_are_the_nearest() {
+        let srgb = SrgbBytes::new();
+        for i in 0..100_000 {
+            let linear = i as f32 * 1.1e-5 - 0.05;
+            assert_eq!(srgb.byte(linear), byte(srgb_from_linear(linear)), "{linear}");
+        }
+        assert_eq!([f32::NAN, f32::NEG_INFINITY, f32::INFINITY].map(|value| srgb.byte(value)), [0, 0, 255]);
     }
 }

@@ -1,4 +1,4 @@
-//! The weighted sums of a rectangle of pixels: the arithmetic under [`super::develop`].
+//! The weighted sums of a rectangle of pixels: the arithmetic under [`super::develop()`].
 //!
 //! A *tap* is a target pixel's place relative to a source pixel, from −reach to +reach along each axis. Rows of taps
 //! are padded to whole groups of four with weights of 0, so that one group is one SIMD register. The sums have as many
@@ -6,12 +6,9 @@
 
 use std::ops::Range;
 
-use super::filter::Filter;
+use super::filter::{Filter, GROUP};
 use crate::math::Vec4;
 use crate::sample::PixelRect;
-
-/// Taps in a group.
-const GROUP: usize = 4;
 
 /// The least share of Σ |w| that Σ w may be: below, dividing would make a pixel more than 10 times as bright as its
 /// brightest sample.
@@ -37,7 +34,7 @@ struct Layout {
 impl Layout {
     fn new(filter: &Filter, rect: PixelRect) -> Self {
         let reach = filter.reach() as usize;
-        let groups = (2 * reach + 1).div_ceil(GROUP);
+        let groups = filter.groups();
         Self { rect, reach, groups, stride: rect.width() as usize + 2 * reach + GROUP * groups - 1 }
     }
 
@@ -70,10 +67,10 @@ pub(super) struct Spread {
     /// Row of the sums of the first of those.
     row: usize,
     samples: usize,
-    /// Weights along x: for each group, for each sample.
+    /// Weights along x: for each group of taps, for each sample.
     along_x: Vec<Vec4>,
-    /// Weights along y: for each tap, for each sample.
-    along_y: Vec<f32>,
+    /// Weights along y, likewise.
+    along_y: Vec<Vec4>,
     totals: Vec<f32>,
     /// Sums of the weights' magnitudes, where those differ from the weights.
     magnitudes: Vec<f32>,
@@ -101,7 +98,7 @@ impl Spread {
 
     /// Makes a source pixel the current one: looks up the weights of its samples and adds them to the totals.
     pub(super) fn weigh(&mut self, filter: &Filter, pixel: [i32; 2], offsets: &[[f32; 2]]) {
-        let Layout { rect, reach, groups, stride } = self.layout;
+        let Layout { rect, reach, groups, .. } = self.layout;
         let last = 2 * reach as i32;
         let reach_rows = reach as i32;
         let first_tap = (rect.y0 - pixel[1] + reach_rows).clamp(0, last + 1);
@@ -111,56 +108,73 @@ impl Spread {
         self.column = (pixel[0] - rect.x0 + reach_rows) as usize;
         self.samples = offsets.len();
 
-        // The target of tap k lies k − reach pixels away.
-        let weight = |offset: f32, tap: usize| filter.weight(offset - 0.5 + (reach as f32 - tap as f32));
-        self.along_x.clear();
-        for group in 0..groups {
-            self.along_x.extend(offsets.iter().map(|offset| {
-                let tap = |lane| group * GROUP + lane;
-                let lane = |lane| if tap(lane) > 2 * reach { 0.0 } else { weight(offset[0], tap(lane)) };
-                Vec4::new(lane(0), lane(1), lane(2), lane(3))
-            }));
-        }
-        self.along_y.clear();
-        for tap in 0..=2 * reach {
-            self.along_y.extend(offsets.iter().map(|offset| weight(offset[1], tap)));
+        let samples = offsets.len();
+        self.along_x.resize(groups * samples, Vec4::ZERO);
+        self.along_y.resize(groups * samples, Vec4::ZERO);
+        for (sample, [x, y]) in offsets.iter().enumerate() {
+            for (group, (x, y)) in filter.weights(*x).zip(filter.weights(*y)).enumerate() {
+                self.along_x[group * samples + sample] = x;
+                self.along_y[group * samples + sample] = y;
+            }
         }
 
-        for (row, tap) in self.taps.clone().enumerate() {
-            let place = (self.row + row) * stride + self.column;
-            for group in 0..groups {
-                let (along_x, along_y) = self.weights(group, tap);
-                let place = place + group * GROUP;
-                let total = along_x.iter().zip(along_y).fold(Vec4::ZERO, |sum, (x, y)| sum + *x * *y);
-                add(&mut self.totals[place..place + GROUP], total);
-                if !self.magnitudes.is_empty() {
-                    let (along_x, along_y) = self.weights(group, tap);
-                    let sum = along_x.iter().zip(along_y).fold(Vec4::ZERO, |sum, (x, y)| sum + (*x * *y).abs());
-                    add(&mut self.magnitudes[place..place + GROUP], sum);
+        let mut totals = std::mem::take(&mut self.totals);
+        self.add_totals(&mut totals, |weight| weight);
+        self.totals = totals;
+        if !self.magnitudes.is_empty() {
+            let mut magnitudes = std::mem::take(&mut self.magnitudes);
+            self.add_totals(&mut magnitudes, Vec4::abs);
+            self.magnitudes = magnitudes;
+        }
+    }
+
+    /// Adds a function of the current pixel's weights to the totals, for each tap in the order of the samples.
+    fn add_totals(&self, totals: &mut [f32], function: impl Fn(Vec4) -> Vec4) {
+        for group_y in 0..self.layout.groups {
+            for group_x in 0..self.layout.groups {
+                // Four rows of taps at once, since the additions of one wait for each other.
+                let mut rows = [Vec4::ZERO; GROUP];
+                for (x, y) in self.of_group(&self.along_x, group_x).iter().zip(self.of_group(&self.along_y, group_y)) {
+                    let [y0, y1, y2, y3] = y.to_array();
+                    rows[0] += function(*x * y0);
+                    rows[1] += function(*x * y1);
+                    rows[2] += function(*x * y2);
+                    rows[3] += function(*x * y3);
+                }
+                for (lane, row) in rows.iter().enumerate() {
+                    let tap = group_y * GROUP + lane;
+                    if self.taps.contains(&tap) {
+                        let place = self.place(tap - self.taps.start) + group_x * GROUP;
+                        let totals = totals[place..place + GROUP].iter_mut();
+                        totals.zip(row.to_array()).for_each(|(total, part)| *total += part);
+                    }
                 }
             }
         }
     }
 
-    /// The weights of all samples in one group along x and at one tap along y.
-    fn weights(&self, group: usize, tap: usize) -> (&[Vec4], &[f32]) {
-        let of = |part: usize| part * self.samples..(part + 1) * self.samples;
-        (&self.along_x[of(group)], &self.along_y[of(tap)])
+    fn of_group<'a>(&self, weights: &'a [Vec4], group: usize) -> &'a [Vec4] {
+        &weights[group * self.samples..(group + 1) * self.samples]
+    }
+
+    /// The sum of the current pixel's first tap in one of its rows of taps.
+    fn place(&self, row: usize) -> usize {
+        (self.row + row) * self.layout.stride + self.column
     }
 
     /// Sums the current pixel's values (one per sample) for each tap. Every sum is in the order of the samples.
     pub(super) fn spread(&self, values: &[Vec4], part: &mut Vec<Vec4>) {
         part.clear();
         for tap in self.taps.clone() {
+            let along_y = self.of_group(&self.along_y, tap / GROUP);
             for group in 0..self.layout.groups {
-                let (along_x, along_y) = self.weights(group, tap);
                 let mut sums = [Vec4::ZERO; GROUP];
-                for ((x, y), value) in along_x.iter().zip(along_y).zip(values) {
-                    let weight = *x * *y;
-                    sums[0] += *value * weight.x;
-                    sums[1] += *value * weight.y;
-                    sums[2] += *value * weight.z;
-                    sums[3] += *value * weight.w;
+                for ((x, y), value) in self.of_group(&self.along_x, group).iter().zip(along_y).zip(values) {
+                    let weights = *x * y.as_ref()[tap % GROUP];
+                    sums[0] += *value * weights.x;
+                    sums[1] += *value * weights.y;
+                    sums[2] += *value * weights.z;
+                    sums[3] += *value * weights.w;
                 }
                 part.extend(sums);
             }
@@ -171,7 +185,7 @@ impl Spread {
     pub(super) fn add(&self, part: &[Vec4], sums: &mut Sums) {
         let taps = self.layout.groups * GROUP;
         for (row, part) in part.chunks_exact(taps).enumerate() {
-            let place = (self.row + row) * self.layout.stride + self.column;
+            let place = self.place(row);
             sums.values[place..place + taps].iter_mut().zip(part).for_each(|(sum, part)| *sum += *part);
         }
     }
@@ -201,8 +215,4 @@ impl Spread {
         let magnitude = self.magnitudes.get(place).copied().unwrap_or(total);
         total < CANCELLED * magnitude || total < 1e-6 * self.peak
     }
-}
-
-fn add(totals: &mut [f32], part: Vec4) {
-    totals.iter_mut().zip(part.to_array()).for_each(|(total, part)| *total += part);
 }
