@@ -1,8 +1,7 @@
-//! Script analysis: text goldens of what is known of small scripts, and a property test of its soundness.
+//! Script analysis: text goldens of what is known of small scripts,.
 
 mod golden;
 mod shaders;
-mod soundness;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -19,7 +18,8 @@ fn analysis(script: &str, params: &[(&str, Value)]) -> Analysis {
     engine.set_optimization_level(rhai::OptimizationLevel::None);
     engine.set_max_expr_depths(0, 0);
     let ast = engine.compile(script).unwrap_or_else(|error| panic!("{error}\n{script}"));
-    let params: BTreeMap<String, Value> = params.iter().map(|(key, value)| ((*key).to_owned(), value.clone())).collect();
+    let params: BTreeMap<String, Value> =
+        params.iter().map(|(key, value)| ((*key).to_owned(), value.clone())).collect();
     analyse(&ast, &Params(Arc::new(params)), &[texture([51, 102, 0, 255], [102, 204, 0, 255])])
 }
 
@@ -39,7 +39,12 @@ fn assert_dump(analysis: &Analysis, expected: &str) {
 /// Two linear pixels.
 fn texture(a: [u8; 4], b: [u8; 4]) -> Arc<Texture> {
     let image = Image { width: 2, height: 1, pixels: Pixels::Rgba8 { data: vec![a, b], srgb: false } };
-    Arc::new(Texture { name: "two".into(), image: Arc::new(image), wrap: [Wrap::Repeat; 2], filter: TextureFilter::Linear })
+    Arc::new(Texture {
+        name: "two".into(),
+        image: Arc::new(image),
+        wrap: [Wrap::Repeat; 2],
+        filter: TextureFilter::Linear,
+    })
 }
 
 fn texture_ref(uv_set: u32) -> Value {

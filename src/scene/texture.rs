@@ -80,7 +80,6 @@ pub struct TextureRef {
 }
 
 impl Texture {
-<<<<<<< HEAD
     /// Least and greatest linear value of each channel.
     #[must_use]
     pub fn range(&self) -> ([f32; 4], [f32; 4]) {
@@ -103,7 +102,8 @@ impl Texture {
             Pixels::Rgba32F { data } => data.iter().for_each(|pixel| include(*pixel)),
         }
         (low, high)
-=======
+    }
+
     /// The pixel values at a place, filtered, linear.
     #[must_use]
     pub fn sample(&self, uv: Vec2) -> Vec4 {
@@ -112,6 +112,5 @@ impl Texture {
             Pixels::Rgba8 { data, .. } => Vec4::from(data[0].map(|c| f32::from(c) / 255.0)),
             Pixels::Rgba32F { data } => Vec4::from(data[0]),
         }
->>>>>>> 9742f65
     }
 }

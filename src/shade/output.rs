@@ -125,9 +125,8 @@ fn color(key: &str, value: &Dynamic) -> Result<Vec3, Fault> {
 
 fn whole(key: &str, value: &Dynamic) -> Result<i32, Fault> {
     let int = value.as_int().map_err(|_| mistyped(key, "an int", value))?;
-    i32::try_from(int).map_err(|_| {
-        Fault::new(format!("the output `{key}` must be within ±{}, but it is {int}", i32::MAX))
-    })
+    i32::try_from(int)
+        .map_err(|_| Fault::new(format!("the output `{key}` must be within ±{}, but it is {int}", i32::MAX)))
 }
 
 /// Empties the columns, and gives the wanted ones and the extra ones room.

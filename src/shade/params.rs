@@ -166,7 +166,11 @@ pub(super) fn resolve(
 fn unknown(name: &str, values: &BTreeMap<String, Value>, program: &Program) -> Fault {
     let script = &program.source.name;
     let fault = Fault::new(format!("the shader {script} has no parameter `{name}`"));
-    if values.is_empty() { fault.hint("it has no parameters") } else { fault.propose(name, values.keys().map(String::as_str)) }
+    if values.is_empty() {
+        fault.hint("it has no parameters")
+    } else {
+        fault.propose(name, values.keys().map(String::as_str))
+    }
 }
 
 fn mistyped(name: &str, default: &Value, given: &ParamValue) -> Fault {

@@ -121,9 +121,7 @@ impl Program {
     pub fn defaults(&self, engine: &Engine) -> Result<Dynamic, Diagnostic> {
         match &self.params {
             None => Ok(Dynamic::from_map(rhai::Map::new())),
-            Some(params) => {
-                self.run(engine, &mut Caches::new(), params, []).map_err(|error| self.explain(&error))
-            }
+            Some(params) => self.run(engine, &mut Caches::new(), params, []).map_err(|error| self.explain(&error)),
         }
     }
 

@@ -77,8 +77,7 @@ impl Walker<'_> {
             let (Expr::Dot(sides, flags, position) | Expr::Index(sides, flags, position)) = link else { break };
             root.get_or_insert(&sides.lhs);
             let is_index = matches!(link, Expr::Index(..));
-            let goes_on =
-                matches!(sides.rhs, Expr::Dot(..) | Expr::Index(..)) && !flags.contains(ASTFlags::BREAK);
+            let goes_on = matches!(sides.rhs, Expr::Dot(..) | Expr::Index(..)) && !flags.contains(ASTFlags::BREAK);
             let (item, next) = match &sides.rhs {
                 Expr::Dot(next, ..) | Expr::Index(next, ..) if goes_on => (&next.lhs, Some(&sides.rhs)),
                 last => (last, None),
@@ -217,7 +216,7 @@ impl Walker<'_> {
             Shape::Hit => match inputs::by_name(name) {
                 Some(input) => self.input(input),
                 None => {
-                    self.unknown_name(&format!("`hit` has no input `{name}`"), name, inputs::names(), position);
+                    self.unknown_name(format!("there is no input `{name}` on `hit`"), name, inputs::names(), position);
                     self.inputs = InputSet::all();
                     self.value(Shape::Unknown, InputSet::all())
                 }
@@ -251,32 +250,26 @@ impl Walker<'_> {
             }
             None => {
                 if record.is_params {
-                    let names: Vec<String> = record.fields.keys().map(|key| key.to_string()).collect();
-                    self.unknown_name(&format!("there is no parameter `{name}`"), name, names.into_iter(), position);
+                    let names = record.fields.keys().map(|key| &**key);
+                    self.unknown_name(format!("there is no parameter `{name}`"), name, names, position);
                 }
                 self.unit()
             }
         }
     }
 
-    fn unknown_name(
+    fn unknown_name<'c>(
         &mut self,
-        message: &str,
+        message: String,
         name: &str,
-        candidates: impl Iterator<Item = String>,
+        candidates: impl Iterator<Item = &'c str>,
         position: Position,
     ) {
         let hint = nearest_hint(name, candidates);
-        self.findings.insert(Finding { place: place(position), message: message.to_owned(), hint });
+        self.findings.insert(Finding { place: place(position), message, hint });
     }
 
-    fn with_property(
-        &mut self,
-        target: &Abstract,
-        name: &str,
-        item: Abstract,
-        position: Position,
-    ) -> Flow<Abstract> {
+    fn with_property(&mut self, target: &Abstract, name: &str, item: Abstract, position: Position) -> Flow<Abstract> {
         match &target.shape {
             Shape::Hit => self.give_up(position, "an assignment to `hit`"),
             Shape::Record(record) => {
@@ -354,12 +347,10 @@ impl Walker<'_> {
                 }
                 Ok(self.constant(Shape::Array(Rc::new(items))))
             }
-            (Shape::Vector(vector), Shape::Int(low, high)) => {
-                match exact_index(*low, *high, vector.channels.len()) {
-                    Some(index) => Ok(self.with_channels(target, vector, &[index], &item)),
-                    None => Ok(self.unknown([target, index, &item])),
-                }
-            }
+            (Shape::Vector(vector), Shape::Int(low, high)) => match exact_index(*low, *high, vector.channels.len()) {
+                Some(index) => Ok(self.with_channels(target, vector, &[index], &item)),
+                None => Ok(self.unknown([target, index, &item])),
+            },
             _ => Ok(self.unknown([target, index, &item])),
         }
     }

@@ -90,8 +90,9 @@ pub(super) fn functions(ast: &AST) -> Functions {
     let mut functions = Functions::new();
     for function in ast.iter_functions() {
         let count = function.params.len();
-        // The engine does not let bodies out, but walks them.
-        let alone = ast.clone_functions_only_filtered(|_, _, _, name, n| name == function.name && n == count);
+        // The engine does not let bodies out, but walks them. (Its `clone_functions_only_filtered` would copy all.)
+        let mut alone = ast.clone_functions_only();
+        alone.retain_functions(|_, _, name, n| name == function.name && n == count);
         let mut body = Vec::new();
         alone.walk(&mut |path: &[ASTNode]| {
             if let [ASTNode::Stmt(statement)] = path {
@@ -102,9 +103,7 @@ pub(super) fn functions(ast: &AST) -> Functions {
         let parameters = function.params.iter().map(|name| (*name).to_owned()).collect();
         let is_typed = function.this_type.is_some();
         let entry = functions.entry((function.name.to_owned(), count));
-        entry
-            .and_modify(|other| other.is_typed = true)
-            .or_insert(ScriptFunction { parameters, body, is_typed });
+        entry.and_modify(|other| other.is_typed = true).or_insert(ScriptFunction { parameters, body, is_typed });
     }
     functions
 }
@@ -113,8 +112,8 @@ pub(super) fn functions(ast: &AST) -> Functions {
 pub(super) struct Walker<'a> {
     pub functions: &'a Functions,
     pub textures: &'a [Arc<Texture>],
-    /// Constants of the script's top level, as `global::NAME`.
-    pub globals: BTreeMap<Rc<str>, Abstract>,
+    /// Bounds of the textures that were looked up, which cost a look at all pixels, by their index.
+    pub texture_bounds: BTreeMap<usize, Shape>,
     /// The innermost call is the last.
     pub calls: Vec<Call>,
     /// Inputs that were read.
@@ -137,7 +136,7 @@ impl<'a> Walker<'a> {
         Self {
             functions,
             textures,
-            globals: BTreeMap::new(),
+            texture_bounds: BTreeMap::new(),
             calls: vec![Call::default()],
             inputs: InputSet::empty(),
             findings: BTreeSet::new(),
@@ -191,7 +190,11 @@ impl<'a> Walker<'a> {
     /// Counts the work; a walk that grows too long ends.
     pub fn step(&mut self, position: Position) -> Flow<()> {
         self.steps += 1;
-        if self.steps > MAX_STEPS { self.give_up(position, "a script that branches or loops this much") } else { Ok(()) }
+        if self.steps > MAX_STEPS {
+            self.give_up(position, "a script that branches or loops this much")
+        } else {
+            Ok(())
+        }
     }
 
     /// Whether a loop may still be walked round by round.
@@ -271,10 +274,7 @@ impl<'a> Walker<'a> {
     /// Joins all paths that got to one place; `None` if none did.
     pub fn join_exits(&mut self, exits: Exits, control: InputSet) -> Option<(Variables, Abstract)> {
         exits.states.into_iter().reduce(|(variables_a, value_a), (variables_b, value_b)| {
-            (
-                self.join_variables(&variables_a, &variables_b, control),
-                self.join_values(&value_a, &value_b, control),
-            )
+            (self.join_variables(&variables_a, &variables_b, control), self.join_values(&value_a, &value_b, control))
         })
     }
 

@@ -11,14 +11,16 @@ use crate::math::{Vec3, linear_from_srgb, luminance};
 pub(super) const FUNCTIONS: &[Function] = &[
     Function { name: "rgb", form: "rgb(r, g, b)", about: "a linear colour, the same as vec3" },
     Function { name: "gray", form: "gray(x)", about: "rgb(x, x, x)" },
-    Function { name: "srgb", form: "srgb(r, g, b)", about: "a linear colour from sRGB values 0 … 1; also srgb(color)" },
-    Function { name: "hsv", form: "hsv(hue, saturation, value)", about: "a colour; the hue is in turns and wraps" },
-    Function { name: "hsv_from_rgb", form: "hsv_from_rgb(color)", about: "vec3 of hue in turns (0 … 1), saturation, value" },
     Function {
-        name: "luminance",
-        form: "luminance(color)",
-        about: "r·0.2126 + g·0.7152 + b·0.0722",
+        name: "srgb", form: "srgb(r, g, b)", about: "a linear colour from sRGB values 0 … 1; also srgb(color)"
     },
+    Function { name: "hsv", form: "hsv(hue, saturation, value)", about: "a colour; the hue is in turns and wraps" },
+    Function {
+        name: "hsv_from_rgb",
+        form: "hsv_from_rgb(color)",
+        about: "vec3 of hue in turns (0 … 1), saturation, value",
+    },
+    Function { name: "luminance", form: "luminance(color)", about: "r·0.2126 + g·0.7152 + b·0.0722" },
 ];
 
 /// For `n` = 5, 3 and 1 (red, green, blue), with `k = mod(n + hue * 6, 6)`:

@@ -88,8 +88,19 @@ pub(super) fn register(engine: &mut Engine) {
         )* };
     }
     columns!(
-        position, normal, geometric_normal, incoming, uv, tangent, color, barycentric, distance, depth, front_facing,
-        pixels_per_unit, curvature
+        position,
+        normal,
+        geometric_normal,
+        incoming,
+        uv,
+        tangent,
+        color,
+        barycentric,
+        distance,
+        depth,
+        front_facing,
+        pixels_per_unit,
+        curvature
     );
     let id = |hit: &Hit, name: &str, column: &[u32]| hit.read(name, column).map(i64::from);
     engine.register_get("object_id", move |hit: &mut Hit| id(hit, "object_id", &hit.batch.object_id));

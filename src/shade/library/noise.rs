@@ -12,10 +12,26 @@ use super::operand::{Operand, Outcome, refuse};
 use crate::shade::fault::Fault;
 
 pub(super) const FUNCTIONS: &[Function] = &[
-    Function { name: "value_noise", form: "value_noise(point)", about: "smooth noise 0 … 1, lattice values interpolated" },
-    Function { name: "gradient_noise", form: "gradient_noise(point)", about: "Perlin noise −1 … 1, 0 at whole coordinates" },
-    Function { name: "cellular_noise", form: "cellular_noise(point)", about: "distance to the nearest of scattered points, 0 … 1.5" },
-    Function { name: "cell_id", form: "cell_id(point)", about: "a number 0 … 1 that belongs to the nearest scattered point" },
+    Function {
+        name: "value_noise",
+        form: "value_noise(point)",
+        about: "smooth noise 0 … 1, lattice values interpolated",
+    },
+    Function {
+        name: "gradient_noise",
+        form: "gradient_noise(point)",
+        about: "Perlin noise −1 … 1, 0 at whole coordinates",
+    },
+    Function {
+        name: "cellular_noise",
+        form: "cellular_noise(point)",
+        about: "distance to the nearest of scattered points, 0 … 1.5",
+    },
+    Function {
+        name: "cell_id",
+        form: "cell_id(point)",
+        about: "a number 0 … 1 that belongs to the nearest scattered point",
+    },
     Function {
         name: "fbm",
         form: "fbm(point, octaves)",
@@ -57,9 +73,8 @@ fn sample(name: &str, noise: &FastNoiseLite, point: Dynamic) -> Outcome<f32> {
 
 pub(super) fn register(engine: &mut Engine) {
     let value = noise(NoiseType::Value);
-    engine.register_fn("value_noise", move |point: Dynamic| {
-        sample("value_noise", &value, point).map(|n| 0.5 + 0.5 * n)
-    });
+    engine
+        .register_fn("value_noise", move |point: Dynamic| sample("value_noise", &value, point).map(|n| 0.5 + 0.5 * n));
     let gradient = noise(NoiseType::Perlin);
     engine.register_fn("gradient_noise", move |point: Dynamic| sample("gradient_noise", &gradient, point));
     // The source gives the distance less 1.

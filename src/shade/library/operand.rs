@@ -100,11 +100,7 @@ pub(super) fn number(name: &str, value: &Dynamic) -> Outcome<f32> {
 }
 
 /// Applies `f` to each component. Numbers join vectors of any size; vectors must be of one size.
-pub(super) fn lanewise<const N: usize>(
-    name: &str,
-    arguments: [Dynamic; N],
-    f: impl Fn([f32; N]) -> f32,
-) -> Outcome {
+pub(super) fn lanewise<const N: usize>(name: &str, arguments: [Dynamic; N], f: impl Fn([f32; N]) -> f32) -> Outcome {
     let mut operands = [Operand::Float(0.0); N];
     let mut width = 1;
     for (operand, argument) in operands.iter_mut().zip(&arguments) {
@@ -140,7 +136,6 @@ pub(super) fn binary(engine: &mut Engine, name: &'static str, f: fn(f32, f32) ->
 /// Registers a function of three arguments that works on each component.
 pub(super) fn ternary(engine: &mut Engine, name: &'static str, f: fn(f32, f32, f32) -> f32) {
     engine.register_fn(name, move |x: f32, y: f32, z: f32| f(x, y, z));
-    engine.register_fn(name, move |x: Dynamic, y: Dynamic, z: Dynamic| {
-        lanewise(name, [x, y, z], |[x, y, z]| f(x, y, z))
-    });
+    engine
+        .register_fn(name, move |x: Dynamic, y: Dynamic, z: Dynamic| lanewise(name, [x, y, z], |[x, y, z]| f(x, y, z)));
 }

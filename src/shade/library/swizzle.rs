@@ -71,8 +71,6 @@ fn lane<V: Vector>(index: i64) -> Outcome<usize> {
 fn unknown<V: Vector>(name: &str) -> Fault {
     let spell = |letters: &[char]| letters.iter().map(char::to_string).collect::<Vec<_>>().join(" ");
     let [xyzw, rgba] = SPELLINGS.map(|letters| spell(&letters[..V::WIDTH]));
-    Fault::new(format!("a {} has no `{name}`", V::NAME)).hint(format!(
-        "its parts are {xyzw}, or {rgba}, and two or three of them together, as in `.{}{}`",
-        'x', 'y'
-    ))
+    Fault::new(format!("a {} has no `{name}`", V::NAME))
+        .hint(format!("its parts are {xyzw}, or {rgba}, and two or three of them together, as in `.{}{}`", 'x', 'y'))
 }

@@ -13,13 +13,21 @@ use crate::math::{Vec2, Vec3, Vec4};
 pub(super) const FUNCTIONS: &[Function] = &[
     Function { name: "vec2", form: "vec2(x, y)", about: "two numbers; also vec2(x), or a longer vector's first two" },
     Function { name: "vec3", form: "vec3(x, y, z)", about: "three numbers; also vec3(x), vec3(xy, z), vec3(xyzw)" },
-    Function { name: "vec4", form: "vec4(x, y, z, w)", about: "four numbers; also vec4(x), vec4(xyz, w), vec4(xy, zw)" },
+    Function {
+        name: "vec4",
+        form: "vec4(x, y, z, w)",
+        about: "four numbers; also vec4(x), vec4(xyz, w), vec4(xy, zw)",
+    },
     Function { name: "dot", form: "dot(a, b)", about: "sum of the products of the components" },
     Function { name: "cross", form: "cross(a, b)", about: "the vec3 at right angles to two others" },
     Function { name: "length", form: "length(v)", about: "sqrt(dot(v, v))" },
     Function { name: "distance", form: "distance(a, b)", about: "length(a − b)" },
     Function { name: "normalize", form: "normalize(v)", about: "v / length(v); a vector of length 0 stays 0" },
-    Function { name: "reflect", form: "reflect(incoming, normal)", about: "incoming − normal·(2·dot(normal, incoming))" },
+    Function {
+        name: "reflect",
+        form: "reflect(incoming, normal)",
+        about: "incoming − normal·(2·dot(normal, incoming))",
+    },
     Function {
         name: "refract",
         form: "refract(incoming, normal, eta)",
@@ -110,8 +118,7 @@ fn register_kind<V: Vector + PartialEq>(engine: &mut Engine) {
         engine.register_fn(V::NAME, |a: Dynamic, b: Dynamic, c: Dynamic| gather::<V, 3>([a, b, c]));
     }
     if V::WIDTH > 3 {
-        engine
-            .register_fn(V::NAME, |a: Dynamic, b: Dynamic, c: Dynamic, d: Dynamic| gather::<V, 4>([a, b, c, d]));
+        engine.register_fn(V::NAME, |a: Dynamic, b: Dynamic, c: Dynamic, d: Dynamic| gather::<V, 4>([a, b, c, d]));
     }
 
     engine.register_fn("==", |a: V, b: V| a == b);
