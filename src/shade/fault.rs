@@ -51,10 +51,14 @@ impl From<Fault> for Box<EvalAltResult> {
     }
 }
 
-/// The span of a position; without one, the end of the text.
+/// The span of a position; without one, the end of the text. A dot stands for the name behind it.
 pub(super) fn span(source: &Arc<Source>, position: Position) -> Span {
     match position.line() {
-        Some(line) => Span::word_at(source, line, position.position().unwrap_or(1)),
+        Some(line) => {
+            let column = position.position().unwrap_or(1);
+            let dot = source.text[source.offset(line, column)..].starts_with('.');
+            Span::word_at(source, line, column + usize::from(dot))
+        }
         None => Span::new(source, source.text.len()..source.text.len()),
     }
 }
@@ -73,7 +77,11 @@ pub(super) fn from_parse_error(error: &ParseError, source: &Arc<Source>) -> Diag
         Kind::FnDuplicatedDefinition(name, count) => {
             Fault::new(format!("there are two functions `{name}` with {count} parameters"))
         }
-        Kind::MissingToken(token, place) => Fault::new(format!("expected `{token}` {place}")),
+        Kind::MissingToken(token, place) => {
+            let fault = Fault::new(format!("expected `{token}` {place}"));
+            let rest = source.text[span(source, error.position()).range.start..].trim();
+            if rest.is_empty() { fault.hint("the script ends here: is a closing `}` or `)` missing?") } else { fault }
+        }
         Kind::WrongDocComment => Fault::new("a `///` comment must be followed by a function")
             .hint("write `//!` at the head of the file, and `//` elsewhere"),
         other => Fault::new(lower_first(&other.to_string())),
@@ -110,7 +118,8 @@ fn explain(error: &EvalAltResult, functions: &[(String, usize)]) -> Fault {
         },
         Kind::ErrorFunctionNotFound(signature, _) => unknown_function(signature, functions),
         Kind::ErrorVariableNotFound(name, _) => unknown_variable(name),
-        Kind::ErrorPropertyNotFound(name, _) => Fault::new(format!("this record has no `{name}`")),
+        Kind::ErrorPropertyNotFound(name, _) => Fault::new(format!("this record has no `{name}`"))
+            .hint(format!("`\"{name}\" in record` tells whether it has")),
         Kind::ErrorDotExpr(message, _) => unknown_property(message),
         Kind::ErrorTooManyOperations(_) => {
             Fault::new(format!("the script did not finish within {MAX_OPERATIONS} operations"))

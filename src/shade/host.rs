@@ -11,7 +11,7 @@ use rhai::packages::{
     ArithmeticPackage, BasicArrayPackage, BasicIteratorPackage, BasicMapPackage, BasicStringPackage, LogicPackage,
     Package,
 };
-use rhai::{Engine, LexError, OptimizationLevel, Token};
+use rhai::{Engine, FloatWrapper, LexError, OptimizationLevel, Token};
 
 use super::library;
 
@@ -94,11 +94,16 @@ fn confine(engine: &mut Engine) {
         .on_print(|_| {})
         .on_debug(|_, _, _| {});
     #[allow(deprecated, reason = "marked so only because it may change; the version of rhai is pinned")]
-    engine.on_parse_token(|token, _, _| refuse(token));
+    engine.on_parse_token(|token, _, _| replace(token));
 }
 
-/// Replaces tokens that have no place in a shader by errors that say so.
-fn refuse(token: Token) -> Token {
+/// Replaces words that stand for numbers by those numbers, and what has no place in a shader by an error that says so.
+fn replace(token: Token) -> Token {
+    if let Token::Identifier(name) = &token
+        && let Some((name, value)) = library::CONSTANTS.into_iter().find(|(known, _)| *known == name.as_str())
+    {
+        return Token::FloatConstant((FloatWrapper::new(value), name.into()).into());
+    }
     let told = match &token {
         Token::Import | Token::Export => "modules are not available in shaders: put the functions into this file",
         Token::Identifier(name) | Token::Reserved(name) => match name.as_str() {

@@ -13,7 +13,7 @@ use crate::diag::{Diagnostic, Diagnostics, Source, Span};
 pub(super) struct Program {
     pub source: Arc<Source>,
     pub ast: AST,
-    /// Its functions with their numbers of parameters.
+    /// Its functions with their numbers of parameters, sorted.
     pub functions: Vec<(String, usize)>,
     pub surface: Function,
     params: Option<Function>,
@@ -57,8 +57,9 @@ impl Program {
         let params = Self::find(&ast, source, "params", 0, "params()", &mut faults);
         match surface {
             Some(surface) if !faults.has_errors() => {
-                let functions =
+                let mut functions: Vec<_> =
                     ast.iter_functions().map(|function| (function.name.to_owned(), function.params.len())).collect();
+                functions.sort();
                 Ok(Self { source: Arc::clone(source), functions, surface, params, ast })
             }
             _ => Err(faults),
@@ -76,7 +77,8 @@ impl Program {
     ) -> Option<Function> {
         let found: Vec<_> = ast.iter_fn_def().filter(|function| function.name == name).collect();
         if let Some(function) = found.iter().find(|function| function.params.len() == count) {
-            let alone = ast.clone_functions_only_filtered(|_, _, _, known, n| known == name && n == count);
+            let mut alone = ast.clone();
+            alone.retain_functions(|_, _, known, n| known == name && n == count);
             let mut body = Vec::new();
             alone.walk(&mut |path| {
                 if let [ASTNode::Stmt(statement)] = path {
@@ -135,16 +137,16 @@ impl Program {
         self.params.as_ref().unwrap_or(&self.surface).span.clone()
     }
 
-    /// Where a key is written in a record, or set on one, if it is at one place only.
+    /// Where a key is written in a record, or else read or set on one, if it is at one place only.
     pub fn key_span(&self, key: &str) -> Option<Span> {
-        let mut places = Vec::new();
-        self.each_key(|name, position| {
+        let (mut written, mut touched) = (Vec::new(), Vec::new());
+        self.each_key(|name, in_literal, position| {
             if name == key {
-                places.push(position);
+                if in_literal { &mut written } else { &mut touched }.push(position);
             }
         });
-        match places.as_slice() {
-            [place] => Some(span(&self.source, *place)),
+        match (written.as_slice(), touched.as_slice()) {
+            ([place], _) | ([], [place]) => Some(span(&self.source, *place)),
             _ => None,
         }
     }
@@ -152,15 +154,18 @@ impl Program {
     /// Names of extra outputs that are written out anywhere, without the prefix, in any order.
     pub fn written_aovs(&self) -> Vec<String> {
         let mut names = Vec::new();
-        self.each_key(|name, _| names.extend(name.strip_prefix(AOV_PREFIX).map(str::to_owned)));
+        self.each_key(|name, _, _| names.extend(name.strip_prefix(AOV_PREFIX).map(str::to_owned)));
         names
     }
 
-    fn each_key(&self, mut see: impl FnMut(&str, Position)) {
+    /// Shows every key with whether it stands in a record's literal, and its place.
+    fn each_key(&self, mut see: impl FnMut(&str, bool, Position)) {
         self.ast.walk(&mut |path| {
             match path.last() {
-                Some(ASTNode::Expr(Expr::Map(map, _))) => map.0.iter().for_each(|(key, _)| see(&key.name, key.pos)),
-                Some(ASTNode::Expr(Expr::Property(property, position))) => see(&property.2, *position),
+                Some(ASTNode::Expr(Expr::Map(map, _))) => {
+                    map.0.iter().for_each(|(key, _)| see(&key.name, true, key.pos))
+                }
+                Some(ASTNode::Expr(Expr::Property(property, position))) => see(&property.2, false, *position),
                 _ => {}
             }
             true

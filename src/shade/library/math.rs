@@ -6,7 +6,7 @@
 
 use std::f32::consts::{PI, TAU};
 
-use rhai::{Dynamic, Engine, Module};
+use rhai::{Dynamic, Engine};
 
 use super::Function;
 use super::operand::{Operand, Outcome, binary, lanewise, refuse, ternary, unary};
@@ -61,6 +61,9 @@ pub(super) const FUNCTIONS: &[Function] = &[
     Function { name: "to_int", form: "to_int(x)", about: "the whole part of a number, as an int" },
     Function { name: "to_float", form: "to_float(x)", about: "the nearest float of an int" },
 ];
+
+/// Words that stand for numbers.
+pub(in crate::shade) const CONSTANTS: [(&str, f32); 2] = [("PI", PI), ("TAU", TAU)];
 
 /// `b` where `b < a`, else `a`: a NaN in `a` stays.
 pub(super) fn min(a: f32, b: f32) -> f32 {
@@ -133,10 +136,6 @@ fn log(x: f32, base: f32) -> f32 {
 }
 
 pub(super) fn register(engine: &mut Engine) {
-    let mut constants = Module::new();
-    constants.set_var("PI", PI).set_var("TAU", TAU);
-    engine.register_global_module(constants.into());
-
     ternary(engine, "mix", mix);
     ternary(engine, "clamp", clamp);
     unary(engine, "saturate", saturate);
