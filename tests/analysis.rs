@@ -1,8 +1,7 @@
-//! Script analysis: text goldens of what is known of small scripts, and a property test of its soundness.
+//! Script analysis: text goldens of what is known of small scripts,.
 
 mod golden;
 mod shaders;
-mod soundness;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;

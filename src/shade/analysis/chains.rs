@@ -216,7 +216,7 @@ impl Walker<'_> {
             Shape::Hit => match inputs::by_name(name) {
                 Some(input) => self.input(input),
                 None => {
-                    self.unknown_name(&format!("`hit` has no input `{name}`"), name, inputs::names(), position);
+                    self.unknown_name(format!("there is no input `{name}` on `hit`"), name, inputs::names(), position);
                     self.inputs = InputSet::all();
                     self.value(Shape::Unknown, InputSet::all())
                 }
@@ -250,23 +250,23 @@ impl Walker<'_> {
             }
             None => {
                 if record.is_params {
-                    let names: Vec<String> = record.fields.keys().map(|key| key.to_string()).collect();
-                    self.unknown_name(&format!("there is no parameter `{name}`"), name, names.into_iter(), position);
+                    let names = record.fields.keys().map(|key| &**key);
+                    self.unknown_name(format!("there is no parameter `{name}`"), name, names, position);
                 }
                 self.unit()
             }
         }
     }
 
-    fn unknown_name(
+    fn unknown_name<'c>(
         &mut self,
-        message: &str,
+        message: String,
         name: &str,
-        candidates: impl Iterator<Item = String>,
+        candidates: impl Iterator<Item = &'c str>,
         position: Position,
     ) {
         let hint = nearest_hint(name, candidates);
-        self.findings.insert(Finding { place: place(position), message: message.to_owned(), hint });
+        self.findings.insert(Finding { place: place(position), message, hint });
     }
 
     fn with_property(&mut self, target: &Abstract, name: &str, item: Abstract, position: Position) -> Flow<Abstract> {

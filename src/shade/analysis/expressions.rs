@@ -5,7 +5,6 @@ use std::rc::Rc;
 use rhai::{Dynamic, Expr, FnCallExpr, Position};
 
 use super::interval::Interval;
-use super::operators;
 use super::value::{Abstract, Field, Record, Shape};
 use super::walk::{Call, Flow, ScriptFunction, Stop, Variable, Walker, place};
 
@@ -85,9 +84,9 @@ impl<'a> Walker<'a> {
             }
             Shape::Record(Rc::new(record))
         } else if let Some(range) = value.read_lock::<std::ops::Range<i64>>() {
-            Shape::Range(range.start, range.end)
+            Shape::Range { low: range.start, end: range.end, exact: true }
         } else if let Some(range) = value.read_lock::<std::ops::RangeInclusive<i64>>() {
-            operators::range(*range.start(), *range.end(), true)
+            Shape::Range { low: *range.start(), end: range.end().saturating_add(1), exact: true }
         } else if value.is_fnptr() {
             return self.give_up(position, "a function pointer");
         } else {
@@ -98,26 +97,24 @@ impl<'a> Walker<'a> {
 
     fn variable(&mut self, name: &str, namespace: Option<&str>, position: Position) -> Flow<Abstract> {
         if let Some(namespace) = namespace {
-            if namespace != "global" {
+            return match namespace {
+                "global" => self.give_up(position, "a name in `global`"),
                 // Only the host can provide modules, since `import` is not followed.
-                return Ok(self.constant(Shape::Unknown));
-            }
-            return match self.globals.get(name) {
-                Some(value) => Ok(value.clone()),
-                None => Ok(self.constant(Shape::Unknown)),
+                _ => Ok(self.constant(Shape::Unknown)),
             };
         }
         if let Some(variable) = self.find(name) {
             return Ok(variable.value.clone());
         }
-        if let Some(value) = self.globals.get(name) {
-            return Ok(value.clone());
-        }
         if self.functions.keys().any(|(function, _)| function.as_str() == name) {
             return self.give_up(position, "a function as a value");
         }
-        // A constant that the host provides, or an error when it runs.
-        Ok(self.constant(Shape::Unknown))
+        Ok(self.constant(match name {
+            "PI" => Shape::Float(Interval::exact(std::f32::consts::PI)),
+            "TAU" => Shape::Float(Interval::exact(std::f32::consts::TAU)),
+            // A constant that the host provides, or an error when it runs.
+            _ => Shape::Unknown,
+        }))
     }
 
     /// `&&` (`decisive` false) and `||` (`decisive` true): the first decisive term ends it.

@@ -1,17 +1,19 @@
-//! What functions do to bounds: the library's and the script engine's own.
+//! What functions do to bounds: those of the library, and of the script engine the few that shaders need.
 //!
-//! Functions that are not known here (a plug-in's) are taken to be pure: their result is unknown and depends on their
-//! arguments. Of the engine's own functions those that change their first argument are listed.
+//! Bounds follow the formulas that the library documents at each function, operation by operation. Functions that are
+//! not known here (a plug-in's) are taken to be pure: their result is unknown and depends on their arguments. Of the
+//! engine's own functions those that change their first argument are listed.
 
 use rhai::Position;
 
+use super::geometry;
 use super::interval::Interval;
 use super::operators;
-use super::value::{Abstract, Shape, Vector, mixed_number};
+use super::value::{Abstract, Shape, Vector};
 use super::walk::{Flow, Walker};
 
 /// Functions of the script engine that change their first argument.
-const MUTATING: [&str; 40] = [
+const MUTATING: [&str; 38] = [
     "append",
     "chop",
     "clear",
@@ -49,10 +51,11 @@ const MUTATING: [&str; 40] = [
     "trim",
     "truncate",
     "write_ascii",
-    "write_be",
-    "write_le",
     "write_utf8",
 ];
+
+/// Functions that give an int if all arguments are ints. All others of numbers give a float.
+const OF_INTS: [&str; 6] = ["min", "max", "clamp", "abs", "sign", "mod"];
 
 impl Walker<'_> {
     /// A call of a function that the script does not define. Gives its value, and its first argument anew if the
@@ -75,16 +78,16 @@ impl Walker<'_> {
                 let inputs = self.escape(texture) | self.escape(uv);
                 self.value(shape, inputs)
             }
-            [x] if operators::unary(name, &x.shape).is_some() => {
-                let shape = operators::unary(name, &x.shape).unwrap_or(Shape::Unknown);
-                self.value(shape, x.all_inputs())
-            }
-            [a, b] if !name.starts_with(|c: char| c.is_alphabetic()) => self.binary(name, a, b),
+            [a, b] if operators::is_binary(name) => self.binary(name, a, b),
             _ if matches!(name, "print" | "debug") => self.unit(),
             _ => {
                 let shapes: Vec<&Shape> = arguments.iter().map(|argument| &argument.shape).collect();
-                let inputs = self.unknown(arguments).inputs;
-                self.value(library(name, &shapes).unwrap_or(Shape::Unknown), inputs)
+                let shape = match shapes.as_slice() {
+                    [x] => operators::unary(name, x).or_else(|| library(name, &shapes)),
+                    _ => library(name, &shapes),
+                };
+                let inputs = arguments.iter().map(|argument| self.escape(argument)).collect();
+                self.value(shape.unwrap_or(Shape::Unknown), inputs)
             }
         };
         Ok((value, None))
@@ -95,7 +98,7 @@ impl Walker<'_> {
             && let (Shape::Record(x), Shape::Record(y)) = (&a.shape, &b.shape)
             && let Some(shape) = operators::merged(x, y)
         {
-            let merged = self.value(shape, a.inputs | b.inputs);
+            let merged = self.constant(shape);
             return (self.unit(), Some(merged));
         }
         (self.unknown(arguments), Some(self.unknown(arguments)))
@@ -105,34 +108,58 @@ impl Walker<'_> {
 /// Type and bounds of a function's result; `None` if nothing is known of it.
 pub(super) fn library(name: &str, arguments: &[&Shape]) -> Option<Shape> {
     constructor(name, arguments)
+        .or_else(|| integer(name, arguments))
         .or_else(|| channelwise(name, arguments))
-        .or_else(|| geometric(name, arguments))
+        .or_else(|| geometry::library(name, arguments))
         .or_else(|| pattern(name, arguments))
         .or_else(|| conversion(name, arguments))
 }
 
 /// Vectors and colors from numbers and vectors.
 fn constructor(name: &str, arguments: &[&Shape]) -> Option<Shape> {
-    let count = match name {
-        "vec2" => 2,
-        "vec3" | "rgb" | "gray" => 3,
-        "vec4" => 4,
+    let (count, is_color) = match name {
+        "vec2" => (2, false),
+        "vec3" => (3, false),
+        "vec4" => (4, false),
+        "rgb" | "gray" => (3, true),
         _ => return None,
     };
     let mut channels = Vec::new();
     for argument in arguments {
         match argument {
-            Shape::Vector(vector) => channels.extend_from_slice(&vector.channels),
+            Shape::Vector(vector) if !is_color => channels.extend_from_slice(&vector.channels),
             other => channels.push(other.number()?),
         }
     }
-    match (name, channels.as_slice()) {
-        // One number may be a packed color.
-        ("rgb", [_]) => None,
-        (_, [x]) => Some(Shape::Vector(Vector::new(vec![*x; count]))),
-        _ if channels.len() == count => Some(Shape::Vector(Vector::new(channels))),
+    match (arguments, channels.as_slice()) {
+        (_, [x]) if name != "rgb" => Some(Shape::Vector(Vector::new(vec![*x; count]))),
+        // The start of a longer vector.
+        ([_], longer) if longer.len() >= count => Some(Shape::Vector(Vector::new(longer[..count].to_vec()))),
+        (_, all) if all.len() == count => Some(Shape::Vector(Vector::new(channels))),
         _ => None,
     }
+}
+
+/// Functions of ints that give an int.
+fn integer(name: &str, arguments: &[&Shape]) -> Option<Shape> {
+    if !OF_INTS.contains(&name) {
+        return None;
+    }
+    let bounds = arguments.iter().map(|shape| match shape {
+        Shape::Int(low, high) => Some((*low, *high)),
+        _ => None,
+    });
+    let bounds = bounds.collect::<Option<Vec<_>>>()?;
+    let (low, high) = match (name, bounds.as_slice()) {
+        ("min", [a, b]) => (a.0.min(b.0), a.1.min(b.1)),
+        ("max", [a, b]) => (a.0.max(b.0), a.1.max(b.1)),
+        ("clamp", [x, low, high]) => (x.0.max(low.0).min(high.0), x.1.max(low.1).min(high.1)),
+        ("abs", [x]) if x.0 >= 0 => *x,
+        ("abs", [x]) => (0, x.0.saturating_neg().max(x.1)),
+        ("sign", [x]) => (x.0.signum(), x.1.signum()),
+        _ => (i64::MIN, i64::MAX),
+    };
+    Some(Shape::Int(low, high))
 }
 
 /// Functions of each channel alone; a number beside vectors counts for all their channels.
@@ -150,74 +177,66 @@ fn channelwise(name: &str, arguments: &[&Shape]) -> Option<Shape> {
     };
     match vector {
         Some(count) => Some(Shape::Vector(Vector::new((0..count).map(of_channel).collect::<Option<Vec<_>>>()?))),
-        None => {
-            let bounds = of_channel(0)?;
-            let is_float = arguments.iter().any(|shape| matches!(shape, Shape::Float(_)));
-            Some(if is_float || arguments.is_empty() { Shape::Float(bounds) } else { mixed_number(bounds) })
-        }
+        // Whether it is an int hangs on arguments that may be ints.
+        None if OF_INTS.contains(&name) && !arguments.iter().any(|shape| matches!(shape, Shape::Float(_))) => None,
+        None => Some(Shape::Float(of_channel(0)?)),
     }
 }
 
 fn scalar(name: &str, arguments: &[Interval]) -> Option<Interval> {
+    use std::f32::consts::PI;
     Some(match (name, arguments) {
-        ("PI", []) => Interval::exact(std::f32::consts::PI),
-        ("E", []) => Interval::exact(std::f32::consts::E),
         ("abs", [x]) => x.abs(),
-        ("sign", [x]) => sign(*x),
-        ("floor", [x]) => x.rising(f32::floor),
-        ("ceil" | "ceiling", [x]) => x.rising(f32::ceil),
-        ("round", [x]) => x.rising(f32::round),
-        ("trunc" | "int", [x]) => x.rising(f32::trunc),
-        ("fract" | "fraction", [x]) => {
-            let least = if x.low >= 0.0 { 0.0 } else { -1.0 };
-            Interval::new(least, 1.0).or_nan(!x.is_finite())
+        ("sign", [x]) => {
+            let sign = |x: f32| if x == 0.0 { 0.0 } else { x.signum() };
+            x.rising(sign)
         }
+        ("floor", [x]) => x.rising(f32::floor),
+        ("ceil", [x]) => x.rising(f32::ceil),
+        ("round", [x]) => x.rising(f32::round),
+        ("fract", [x]) => Interval::UNIT.or_nan(!x.is_finite()),
         ("saturate", [x]) => x.clamp(Interval::exact(0.0), Interval::exact(1.0)),
         ("sqrt", [x]) => x.sqrt(),
-        ("exp", [x]) => {
-            let bounds = x.rising_roughly(f64::exp);
+        ("exp" | "exp2", [x]) => {
+            let bounds = x.rising_roughly(if name == "exp" { f64::exp } else { f64::exp2 });
             Interval { low: bounds.low.max(0.0), ..bounds }
         }
-        ("ln" | "log" | "log2" | "log10", [x]) if x.low >= 0.0 => x.rising_roughly(match name {
+        ("ln" | "log" | "log2", [x]) if x.low >= 0.0 => x.rising_roughly(match name {
             "log2" => f64::log2,
-            "log10" | "log" => f64::log10,
+            "log" => f64::log10,
             _ => f64::ln,
         }),
         ("sin" | "cos", [x]) => Interval::within(1.0).or_nan(!x.is_finite()),
         ("tanh", [x]) => Interval::within(1.0).or_nan(x.nan),
         ("atan", [x]) => Interval::within(1.571).or_nan(x.nan),
-        ("atan" | "atan2", [y, x]) => Interval::within(3.142).or_nan(x.nan || y.nan),
+        ("atan", [y, x]) => Interval::within(3.142).or_nan(x.nan || y.nan),
         ("acos", [x]) if x.low >= -1.0 && x.high <= 1.0 => Interval::new(0.0, 3.142).or_nan(x.nan),
         ("asin", [x]) if x.low >= -1.0 && x.high <= 1.0 => Interval::within(1.571).or_nan(x.nan),
-        ("tan" | "acos" | "asin" | "sinh" | "cosh" | "ln" | "log" | "log2" | "log10", [_]) => Interval::ANY,
+        ("tan" | "acos" | "asin" | "sinh" | "cosh" | "ln" | "log" | "log2", [_]) | ("log", [_, _]) => Interval::ANY,
+        ("radians", [x]) => x.mul(Interval::exact(PI / 180.0)),
+        ("degrees", [x]) => x.mul(Interval::exact(180.0 / PI)),
         ("min", [a, b]) => a.min(*b),
         ("max", [a, b]) => a.max(*b),
-        ("mod", [a, b]) => modulo(*a, *b),
+        ("mod", [x, y]) => modulo(*x, *y),
         ("pow", [x, y]) => x.pow(*y),
         ("step", [edge, x]) => step(*edge, *x),
         ("clamp", [x, low, high]) => x.clamp(*low, *high),
-        ("mix" | "lerp", [a, b, t]) => a.mix(*b, *t),
-        ("smoothstep", [from, to, x]) => smoothstep(*from, *to, *x),
-        ("remap", [x, from, to, new_from, new_to]) => remap(*x, [*from, *to], [*new_from, *new_to]),
+        ("mix", [a, b, t]) => a.mix(*b, *t),
+        ("smoothstep", [low, high, x]) => smoothstep(*low, *high, *x),
+        ("remap", [x, from_low, from_high, to_low, to_high]) => {
+            to_low.add(x.sub(*from_low).div(from_high.sub(*from_low)).mul(to_high.sub(*to_low)))
+        }
         _ => return None,
     })
 }
 
-fn sign(x: Interval) -> Interval {
-    let bounds = match (x.low > 0.0, x.high < 0.0) {
-        (true, _) => Interval::exact(1.0),
-        (_, true) => Interval::exact(-1.0),
-        _ => Interval::within(1.0),
-    };
-    bounds.or_nan(x.nan)
-}
-
-/// The remainder with the sign of the divisor, or with that of the dividend.
-fn modulo(a: Interval, b: Interval) -> Interval {
-    let size = b.size();
-    let least = if a.low >= 0.0 && b.low >= 0.0 { 0.0 } else { -size };
-    let nan = a.nan || b.nan || b.has_zero() || !a.is_finite() || !b.is_finite();
-    Interval::new(least, size).widened(a.size().max(size)).or_nan(nan)
+/// `x - y * floor(x / y)`: from 0 to `y`, but for rounding.
+fn modulo(x: Interval, y: Interval) -> Interval {
+    if !x.div(y).is_finite() {
+        return Interval::ANY;
+    }
+    let between = Interval::exact(0.0).hull(y);
+    between.widened(x.size().max(y.size()))
 }
 
 fn step(edge: Interval, x: Interval) -> Interval {
@@ -228,123 +247,82 @@ fn step(edge: Interval, x: Interval) -> Interval {
     }
 }
 
-fn smoothstep(from: Interval, to: Interval, x: Interval) -> Interval {
-    let rises = from.high < to.low;
-    let finite = from.is_finite() && to.is_finite() && !x.nan;
-    match (rises && finite, x.high <= from.low, x.low >= to.high) {
+/// `t * t * (3 - 2 * t)` of a `t` within 0 … 1, which never leaves 0 … 1 (a test tries all `t` near 1).
+fn smoothstep(low: Interval, high: Interval, x: Interval) -> Interval {
+    let defined = low.is_finite() && high.is_finite() && high.sub(low).is_finite() && !x.nan;
+    let rises = defined && low.high < high.low;
+    match (rises, x.high <= low.low, x.low >= high.high) {
         (true, true, _) => Interval::exact(0.0),
         (true, _, true) => Interval::exact(1.0),
-        (true, ..) => Interval::UNIT,
-        _ => Interval::UNIT.or_nan(true),
+        _ => Interval::UNIT.or_nan(!defined),
     }
 }
 
-fn remap(x: Interval, from: [Interval; 2], to: [Interval; 2]) -> Interval {
-    let t = x.sub(from[0]).div(from[1].sub(from[0]));
-    let free = to[0].mix(to[1], t);
-    let clamped = to[0].mix(to[1], t.clamp(Interval::exact(0.0), Interval::exact(1.0)));
-    let either = free.hull(clamped);
-    either.widened(either.size())
-}
-
-/// Functions of whole vectors.
-fn geometric(name: &str, arguments: &[&Shape]) -> Option<Shape> {
-    let vectors: Option<Vec<&Vector>> = arguments
-        .iter()
-        .map(|shape| match shape {
-            Shape::Vector(vector) => Some(vector),
-            _ => None,
-        })
-        .collect();
-    let vectors = vectors?;
-    Some(match (name, vectors.as_slice()) {
-        ("length", [v]) => Shape::Float(length(v)),
-        ("distance", [a, b]) if a.channels.len() == b.channels.len() => {
-            let between = a.channels.iter().zip(&b.channels).map(|(a, b)| a.sub(*b));
-            Shape::Float(length(&Vector::new(between)))
-        }
-        ("normalize", [v]) => {
-            let length = length(v);
-            let unit = Vector::unit(v.channels.len());
-            let nan = length.nan || length.low <= 0.0 || length.high == f32::INFINITY;
-            Shape::Vector(Vector { channels: unit.channels.iter().map(|c| c.or_nan(nan)).collect(), ..unit })
-        }
-        ("dot", [a, b]) if a.channels.len() == b.channels.len() => Shape::Float(dot(a, b)),
-        ("cross", [a, b]) if a.channels.len() == 3 && b.channels.len() == 3 => {
-            let term = |i: usize, j: usize| {
-                let (x, y) = (a.channels[i].mul(b.channels[j]), a.channels[j].mul(b.channels[i]));
-                x.sub(y).widened(x.size().max(y.size()))
-            };
-            let limit = slightly_more(a.length * b.length);
-            Shape::Vector(Vector::new([term(1, 2), term(2, 0), term(0, 1)]).at_most(limit))
-        }
-        ("reflect", [v, normal]) if v.channels.len() == normal.channels.len() => {
-            let nan = v.channels.iter().chain(&normal.channels).any(|c| !c.is_finite());
-            if nan || slightly_more(normal.length) > 1.1 || v.length > 1e18 {
-                return Some(Shape::Vector(Vector::new(vec![Interval::ANY; v.channels.len()])));
-            }
-            // Along the normal the vector is scaled by 1 − 2 |n|², across it not at all.
-            let growth = (2.0 * normal.length * normal.length - 1.0).max(1.0);
-            let size = slightly_more(v.length * growth);
-            Shape::Vector(Vector::new(vec![Interval::within(size); v.channels.len()]).at_most(size))
-        }
-        ("luminance", [color]) if color.channels.len() >= 3 => {
-            let weighted = |i: usize, weight| color.channels[i].mul(Interval::exact(weight));
-            Shape::Float(weighted(0, 0.2126).add(weighted(1, 0.7152)).add(weighted(2, 0.0722)))
-        }
-        _ => return None,
-    })
-}
-
-fn slightly_more(x: f32) -> f32 {
-    (x * 1.000_01).next_up()
-}
-
-fn length(v: &Vector) -> Interval {
-    let squares = |of: fn(&Interval) -> f32| v.channels.iter().map(|c| f64::from(of(c)).powi(2)).sum::<f64>();
-    let (low, high) = (squares(|c| c.abs().low), squares(|c| c.abs().high));
-    let nan = v.channels.iter().any(|c| c.nan);
-    // Squares may underflow to zero and overflow to infinity.
-    let low = if low < 1e-30 { 0.0 } else { (low.sqrt() * 0.999_999) as f32 };
-    let high = if high > 3e38 { f32::INFINITY } else { slightly_more((high.sqrt() as f32).min(v.length)) };
-    Interval::new(low.min(high), high).or_nan(nan)
-}
-
-fn dot(a: &Vector, b: &Vector) -> Interval {
-    let products = a.channels.iter().zip(&b.channels).map(|(a, b)| a.mul(*b));
-    let (sum, size) = products
-        .fold((Interval::exact(0.0), 0.0_f32), |(sum, size), product| (sum.add(product), size.max(product.size())));
-    let limit = slightly_more(a.length * b.length);
-    let sum = sum.widened(size);
-    if sum.is_finite() && limit.is_finite() { sum.meet(Interval::within(limit)) } else { sum }
-}
-
-/// Colors, noise and the like.
+/// Colors, ramps and noise.
 fn pattern(name: &str, arguments: &[&Shape]) -> Option<Shape> {
-    let finite = arguments.iter().all(|shape| shape.range().is_none_or(Interval::is_finite));
-    Some(match (name, arguments) {
-        ("hash", _) => Shape::Float(Interval::UNIT),
-        ("noise" | "value_noise" | "gradient_noise" | "fbm", _) => Shape::Float(Interval::within(1.0).or_nan(!finite)),
-        ("hsv", [_, saturation, value]) => {
-            let (s, v) = (saturation.number()?, value.number()?);
-            let is_color = finite && s.low >= 0.0 && s.high <= 1.0 && v.low >= 0.0;
-            let channel = if is_color { Interval::new(0.0, slightly_more(v.high)) } else { Interval::ANY };
-            Shape::Vector(Vector::new([channel; 3]))
+    let number = |shape: &Shape| shape.number().unwrap_or(Interval::ANY);
+    let has_nan = arguments.iter().any(|shape| shape.range().is_none_or(|range| range.nan));
+    let color = |channel| Some(Shape::Vector(Vector::new([channel; 3])));
+    match (name, arguments) {
+        ("hash", [_]) => Some(Shape::Float(Interval::UNIT)),
+        ("hash_color", [_]) => color(Interval::UNIT),
+        ("value_noise" | "cell_id", [_]) => Some(Shape::Float(Interval::UNIT.or_nan(has_nan))),
+        ("gradient_noise", [_]) => Some(Shape::Float(Interval::within(1.0).or_nan(has_nan))),
+        ("fbm", [point, _]) => {
+            let nan = point.range().is_none_or(|range| range.nan);
+            Some(Shape::Float(Interval::within(1.0).or_nan(nan)))
         }
-        _ => return None,
+        ("cellular_noise", [_]) => Some(Shape::Float(Interval::new(0.0, 1.5).or_nan(has_nan))),
+        ("hsv", [hue, saturation, value]) => {
+            let (h, s, v) = (number(hue), number(saturation), number(value));
+            let is_color = !has_nan && h.size() < 1e30 && s.low >= 0.0 && s.high <= 1.0 && v.low >= 0.0;
+            // What is subtracted from the value is a share of it.
+            color(if is_color && v.is_finite() { Interval::new(0.0, v.high) } else { Interval::ANY })
+        }
+        ("srgb" | "hsv_from_rgb", _) => color(Interval::ANY),
+        ("ramp", [t, Shape::Array(stops), ..]) if t.is_number() => ramp(stops),
+        _ => None,
+    }
+}
+
+/// A mean of two neighbouring stops, or one of them; each stop is a position and a value.
+fn ramp(stops: &[Abstract]) -> Option<Shape> {
+    let mut values = Vec::new();
+    let mut positions_are_finite = true;
+    for stop in stops {
+        let Shape::Array(parts) = &stop.shape else { return None };
+        let [position, value] = parts.as_slice() else { return None };
+        positions_are_finite &= position.shape.number()?.is_finite();
+        values.push(match &value.shape {
+            Shape::Vector(vector) => vector.clone(),
+            other => Vector::new([other.number()?]),
+        });
+    }
+    let (first, last) = (values.first()?, values.last()?);
+    if values.iter().any(|value| value.channels.len() != first.channels.len()) {
+        return None;
+    }
+    let channel = |i: usize| {
+        let ends = first.channels[i].hull(last.channels[i]);
+        let means = values.windows(2).map(|pair| pair[0].channels[i].mix(pair[1].channels[i], Interval::UNIT));
+        let hull = means.fold(ends, Interval::hull);
+        if positions_are_finite && values.iter().all(|v| v.channels[i].is_finite()) { hull } else { Interval::ANY }
+    };
+    let channels: Vec<Interval> = (0..first.channels.len()).map(channel).collect();
+    Some(match channels.as_slice() {
+        [x] => Shape::Float(*x),
+        _ => Shape::Vector(Vector::new(channels)),
     })
 }
 
-/// Functions of the script engine between types.
+/// Functions between types.
 fn conversion(name: &str, arguments: &[&Shape]) -> Option<Shape> {
     Some(match (name, arguments) {
         ("to_float", [x]) => Shape::Float(x.number()?),
         ("to_int", [x @ Shape::Int(..)]) => (*x).clone(),
         // What does not fit ends the script with an error; `as` stays within the type's bounds.
         ("to_int", [Shape::Float(x)]) => Shape::Int(x.low as i64, x.high as i64),
-        ("is_nan" | "is_finite" | "is_infinite" | "is_empty" | "is_odd" | "is_even" | "is_zero" | "contains", _) => {
-            Shape::Bool(None)
-        }
+        ("is_nan" | "is_empty" | "is_odd" | "is_even" | "is_zero" | "contains", _) => Shape::Bool(None),
         ("to_string" | "to_debug" | "type_of", _) => Shape::Text(None),
         ("len", [Shape::Array(items)]) => {
             let length = i64::try_from(items.len()).ok()?;
@@ -352,4 +330,17 @@ fn conversion(name: &str, arguments: &[&Shape]) -> Option<Shape> {
         }
         _ => return None,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn smoothstep_stays_within_its_ends() {
+        // Rounding matters only where t·t·(3 − 2·t) is within 1e-6 of 1.
+        let mut t = 0.999_f32;
+        while t <= 1.0 {
+            assert!(t * t * (3.0 - 2.0 * t) <= 1.0, "{t:?}");
+            t = t.next_up();
+        }
+    }
 }

@@ -15,18 +15,13 @@ use crate::shade::names::InputSet;
 pub const LIMIT: f32 = 1e18;
 
 /// Names that scripts read as `hit.NAME`.
-pub(super) fn names() -> impl Iterator<Item = String> {
-    let called = InputSet::LIGHT | InputSet::MORE_UVS;
-    InputSet::all().difference(called).iter_names().map(|(name, _)| name.to_lowercase())
+pub(super) fn names() -> impl Iterator<Item = &'static str> {
+    InputSet::named().filter(|(_, input)| *input != InputSet::LIGHT).map(|(name, _)| name)
 }
 
 /// The input of that name.
 pub(super) fn by_name(name: &str) -> Option<InputSet> {
-    if name.chars().any(|c| c.is_uppercase()) {
-        return None;
-    }
-    let input = InputSet::from_name(&name.to_uppercase())?;
-    (!(InputSet::LIGHT | InputSet::MORE_UVS).intersects(input)).then_some(input)
+    InputSet::spelled(name).filter(|input| *input != InputSet::LIGHT)
 }
 
 /// Type and bounds of an input.
@@ -93,23 +88,18 @@ impl Walker<'_> {
     }
 
     /// What a lookup in a texture can give.
-    pub(super) fn texture_bounds(&self, texture: &Shape) -> Shape {
-        match texture {
-            Shape::Texture(Some(texture)) => match self.textures.get(texture.texture.index()) {
-                Some(texture) => {
-                    let (low, high) = texture.range();
-                    let channel = |i: usize| {
-                        let bounds = Interval { low: low[i], high: high[i], nan: false };
-                        let known = low[i] <= high[i];
-                        // Interpolation rounds.
-                        if known { bounds.widened_unless_zero() } else { Interval::ANY }
-                    };
-                    Shape::Vector(Vector::new((0..4).map(channel)))
-                }
-                None => Shape::Unknown,
-            },
-            Shape::Texture(None) => Shape::Vector(Vector::new([Interval::ANY; 4])),
-            _ => Shape::Unknown,
-        }
+    pub(super) fn texture_bounds(&mut self, texture: &Shape) -> Shape {
+        let index = match texture {
+            Shape::Texture(Some(texture)) => texture.texture.index(),
+            Shape::Texture(None) => return Shape::Vector(Vector::new([Interval::ANY; 4])),
+            _ => return Shape::Unknown,
+        };
+        let Some(texture) = self.textures.get(index) else { return Shape::Unknown };
+        let bounds = self.texture_bounds.entry(index).or_insert_with(|| {
+            let (low, high) = texture.range();
+            let channel = |i: usize| if low[i] <= high[i] { Interval::new(low[i], high[i]) } else { Interval::ANY };
+            Shape::Vector(Vector::new((0..4).map(channel)))
+        });
+        bounds.clone()
     }
 }

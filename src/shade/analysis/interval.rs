@@ -97,11 +97,6 @@ impl Interval {
         self.low.abs().max(self.high.abs())
     }
 
-    /// Each bound moved outwards by the rounding errors of a mean of values of its own size; a mean of zeros is zero.
-    pub fn widened_unless_zero(self) -> Self {
-        Self { low: self.low - self.low.abs() * 1e-6, high: self.high + self.high.abs() * 1e-6, nan: self.nan }
-    }
-
     /// A function that never falls and is computed by the very `f32` operations of `f`.
     pub fn rising(self, f: impl Fn(f32) -> f32) -> Self {
         let (low, high) = (f(self.low), f(self.high));
@@ -246,19 +241,15 @@ impl Interval {
         Self { low: bounds.low.max(0.0), high: bounds.high, nan: self.nan || exponent.nan }
     }
 
-    /// `self · (1 − t) + other · t`, or the same by `self + (other − self) · t`.
+    /// `self * (1 - t) + other * t`.
     pub fn mix(self, other: Self, t: Self) -> Self {
-        let one = Self::exact(1.0);
-        let weighted = self.mul(one.sub(t)).add(other.mul(t));
-        let from_start = self.add(other.sub(self).mul(t));
-        let either = weighted.hull(from_start);
-        if t.low >= 0.0 && t.high <= 1.0 && self.is_finite() && other.is_finite() {
+        let weighted = self.mul(Self::exact(1.0).sub(t)).add(other.mul(t));
+        if t.low >= 0.0 && t.high <= 1.0 && self.is_finite() && other.is_finite() && weighted.is_finite() {
             // A mean lies between its terms, up to rounding.
             let between = self.hull(other);
-            let bounds = between.widened(between.size()).meet(either.or_nan(false));
-            return Self { nan: either.nan, ..bounds };
+            return between.widened(between.size()).meet(Self { nan: t.nan, ..weighted }).or_nan(t.nan);
         }
-        either
+        weighted
     }
 }
 

@@ -6,7 +6,7 @@
 //!
 //! 1. [`interval`] bounds floats; [`value`] says what is known of a value, and joins what is known on two paths.
 //! 2. [`walk`] holds variables, calls and findings; [`statements`], [`expressions`] and [`chains`] walk the syntax tree.
-//! 3. [`operators`], [`functions`] and [`inputs`] give the bounds of what scripts compute and read.
+//! 3. [`operators`], [`functions`], [`geometry`] and [`inputs`] give the bounds of what scripts compute and read.
 //! 4. Here, the record that `surface` returns becomes an [`Analysis`].
 //!
 //! # What the facts promise
@@ -18,9 +18,12 @@
 mod chains;
 mod expressions;
 mod functions;
+mod geometry;
 pub mod inputs;
 mod interval;
 mod operators;
+#[cfg(test)]
+mod soundness;
 mod statements;
 mod switch;
 mod value;
@@ -32,7 +35,7 @@ use std::sync::Arc;
 
 use self::value::{Abstract, Field, Record, Shape};
 use self::walk::{Flow, Walker};
-use super::names::{InputSet, OutputSet};
+use super::names::{AOV_PREFIX, InputSet, OutputSet};
 use super::params::{Params, Value};
 use crate::diag;
 use crate::scene::texture::Texture;
@@ -117,21 +120,15 @@ pub fn unknown() -> Analysis {
 /// The record that `surface` returns; `None` if it never returns.
 fn walk_surface(walker: &mut Walker, ast: &rhai::AST, params: &Params) -> Flow<Option<Rc<Record>>> {
     let start = rhai::Position::NONE;
-    // The top level runs first: its constants are `global::NAME` everywhere, its variables are seen by `surface`.
-    match walker.statements(ast.statements()) {
-        Ok(_) => {}
-        Err(walk::Stop::Left) if walker.call().returns.states.is_empty() => return Ok(None),
-        Err(_) => return walker.give_up(start, "a script that returns before `surface`"),
+    if let Some(statement) = ast.statements().first() {
+        return walker.give_up(statement.position(), "code outside of functions");
     }
-    let top_level = walker.call().variables.clone();
-    walker.globals = top_level.iter().map(|variable| (Rc::clone(&variable.name), variable.value.clone())).collect();
-
     let Some(function) = walker.script_function("surface", 2) else {
         return walker.give_up(start, "a script without `surface(hit, p)`");
     };
     let mut fields = Record { is_params: true, ..Record::default() };
     for (name, value) in params.0.iter() {
-        let shape = Shape::from_value(value, &mut || walker.fresh());
+        let shape = Shape::from_value(value, walker.textures.len(), &mut || walker.fresh());
         let value = walker.constant(shape);
         fields.fields.insert(name.as_str().into(), Field::always(value, (0, 0)));
     }
@@ -172,14 +169,14 @@ impl Analysis {
 
     /// Takes in a key of the returned record.
     fn add(&mut self, key: &str, field: &Field, walker: &mut Walker) {
-        if let Some(name) = key.strip_prefix("aov_") {
+        if let Some(name) = key.strip_prefix(AOV_PREFIX) {
             self.aovs.push((name.to_owned(), fact(field, walker)));
             return;
         }
-        match OutputSet::from_name(&key.to_uppercase()).filter(|_| !key.chars().any(char::is_uppercase)) {
+        match OutputSet::spelled(key) {
             Some(output) => self.outputs[output.bits().trailing_zeros() as usize] = fact(field, walker),
             None => {
-                let names = OutputSet::all().iter_names().map(|(name, _)| name.to_lowercase());
+                let names = OutputSet::named().map(|(name, _)| name);
                 let message = format!("there is no output `{key}`");
                 let hint = nearest_hint(key, names);
                 walker.findings.insert(Finding { place: field.place, message, hint });
@@ -195,8 +192,7 @@ fn fact(field: &Field, walker: &mut Walker) -> OutputFact {
     }
     OutputFact {
         may: true,
-        // What is unknown may be `()`.
-        always: field.always && *shape != Shape::Unknown,
+        always: field.always,
         inputs: walker.escape(&field.value) | field.presence,
         range: shape.range().filter(|range| !range.nan).map(|range| [range.low, range.high]),
         constant: shape.to_value(),
@@ -204,9 +200,8 @@ fn fact(field: &Field, walker: &mut Walker) -> OutputFact {
 }
 
 /// A hint that names the candidate that was perhaps meant.
-fn nearest_hint(name: &str, candidates: impl Iterator<Item = String>) -> Option<String> {
-    let candidates: Vec<String> = candidates.collect();
-    diag::nearest(name, candidates.iter().map(String::as_str)).map(|near| format!("did you mean `{near}`?"))
+fn nearest_hint<'c>(name: &str, candidates: impl Iterator<Item = &'c str>) -> Option<String> {
+    diag::nearest(name, candidates).map(|near| format!("did you mean `{near}`?"))
 }
 
 impl fmt::Display for OutputFact {
@@ -235,14 +230,14 @@ impl fmt::Display for Analysis {
             }
             writeln!(f)?;
         } else {
-            for (name, output) in OutputSet::all().iter_names() {
+            for (name, output) in OutputSet::named() {
                 let fact = self.output(output);
                 if fact.may {
-                    writeln!(f, "{}: {fact}", name.to_lowercase())?;
+                    writeln!(f, "{name}: {fact}")?;
                 }
             }
             for (name, fact) in &self.aovs {
-                writeln!(f, "aov_{name}: {fact}")?;
+                writeln!(f, "{AOV_PREFIX}{name}: {fact}")?;
             }
         }
         for finding in &self.findings {

@@ -21,17 +21,21 @@ pub(super) fn unary(operator: &str, x: &Shape) -> Option<Shape> {
     })
 }
 
+/// Whether a function of this name is a binary operator.
+pub(super) fn is_binary(name: &str) -> bool {
+    const OPERATORS: [&str; 19] =
+        ["+", "-", "*", "/", "%", "**", "==", "!=", "<", "<=", ">", ">=", "..", "..=", "&", "|", "^", "<<", ">>"];
+    OPERATORS.contains(&name)
+}
+
 /// The result of a binary operator; `None` if nothing is known of it.
 pub(super) fn binary(operator: &str, a: &Shape, b: &Shape) -> Option<Shape> {
     match operator {
         "==" | "!=" | "<" | "<=" | ">" | ">=" => return Some(Shape::Bool(compare(operator, a, b))),
         ".." | "..=" => {
-            return match (a, b) {
-                (Shape::Int(low, low_too), Shape::Int(high, high_too)) if low == low_too && high == high_too => {
-                    Some(range(*low, *high, operator == "..="))
-                }
-                _ => None,
-            };
+            let (Shape::Int(low, low_too), Shape::Int(high_too, high)) = (a, b) else { return None };
+            let end = if operator == "..=" { high.saturating_add(1) } else { *high };
+            return Some(Shape::Range { low: *low, end, exact: low == low_too && high == high_too });
         }
         _ => {}
     }
@@ -85,11 +89,6 @@ fn both(a: Option<bool>, b: Option<bool>) -> Option<bool> {
         (Some(true), Some(true)) => Some(true),
         _ => None,
     }
-}
-
-/// Integers from `low` to `high`.
-pub(super) fn range(low: i64, high: i64, inclusive: bool) -> Shape {
-    Shape::Range(low, if inclusive { high.saturating_add(1) } else { high })
 }
 
 /// `b`'s keys put into `a`; `None` if it is open which of the two a key comes from.
@@ -146,50 +145,37 @@ fn integers(operator: &str, a: &Shape, b: &Shape) -> Option<Shape> {
     })
 }
 
-/// What a comparison gives, if that is certain.
-///
-/// The script engine compares floats with a relative tolerance (of `f32::EPSILON`; absolute next to zero), and
-/// comparisons with infinities and NaN go their own ways. So an order is certain only between finite numbers that are
-/// clearly apart, or where the tolerance works in its favour.
+/// What a comparison gives, if that is certain. Floats compare as IEEE 754 says; an int beside one counts as the nearest
+/// float; values of different types are unequal, and in no order.
 fn compare(operator: &str, a: &Shape, b: &Shape) -> Option<bool> {
     match (a, b) {
         (Shape::Int(a_low, a_high), Shape::Int(b_low, b_high)) => {
-            return match operator {
-                "<" => order(a_high < b_low, a_low >= b_high),
-                ">" => order(a_low > b_high, a_high <= b_low),
-                "<=" => order(a_high <= b_low, a_low > b_high),
-                ">=" => order(a_low >= b_high, a_high < b_low),
-                "==" => order(a_low == a_high && a == b, a_high < b_low || a_low > b_high),
-                _ => order(a_high < b_low || a_low > b_high, a_low == a_high && a == b),
-            };
+            return compare_bounds(operator, (a_low, a_high), (b_low, b_high), false);
         }
-        (Shape::Bool(Some(a)), Shape::Bool(Some(b))) => return Some(holds(operator, a.cmp(b))),
-        (Shape::Text(Some(a)), Shape::Text(Some(b))) => return Some(holds(operator, a.cmp(b))),
+        (Shape::Bool(Some(a)), Shape::Bool(Some(b))) => return compare_bounds(operator, (a, a), (b, b), false),
+        (Shape::Text(Some(a)), Shape::Text(Some(b))) => return compare_bounds(operator, (a, a), (b, b), false),
         (Shape::Unit, Shape::Unit) => return Some(operator == "=="),
         _ if a.is_number() && b.is_number() => {}
-        // Values of different types are unequal, and not in any order.
         _ if a.is_typed() && b.is_typed() && !same_type(a, b) => return Some(operator == "!="),
         (Shape::Number(_), other) | (other, Shape::Number(_)) if other.is_typed() => return Some(operator == "!="),
         _ => return None,
     }
     let (a, b) = (a.number()?, b.number()?);
-    let finite = a.is_finite() && b.is_finite();
-    let (less, greater) = (clearly_less(a, b), clearly_less(b, a));
-    let same = a.value().is_some() && a.value() == b.value();
-    match operator {
-        "<" => order(finite && less, a.low >= b.high),
-        ">" => order(finite && greater, b.low >= a.high),
-        "<=" => order(finite && a.high <= b.low, greater),
-        ">=" => order(finite && b.high <= a.low, less),
-        "==" => order(finite && same, less || greater),
-        _ => order(finite && (less || greater), same),
-    }
+    compare_bounds(operator, (&a.low, &a.high), (&b.low, &b.high), a.nan || b.nan)
 }
 
-/// Whether every `a` is less than every `b` by more than the tolerance of comparisons.
-fn clearly_less(a: Interval, b: Interval) -> bool {
-    let (a, b) = (f64::from(a.high), f64::from(b.low));
-    b - a > 4e-7 * a.abs().max(b.abs()).max(1.0)
+fn compare_bounds<T: PartialOrd + ?Sized>(operator: &str, a: (&T, &T), b: (&T, &T), nan: bool) -> Option<bool> {
+    let apart = a.1 < b.0 || a.0 > b.1;
+    let same = a.0 == a.1 && b.0 == b.1 && a.0 == b.0;
+    // With a NaN all comparisons but `!=` fail.
+    match operator {
+        "<" => order(!nan && a.1 < b.0, a.0 >= b.1),
+        ">" => order(!nan && a.0 > b.1, a.1 <= b.0),
+        "<=" => order(!nan && a.1 <= b.0, a.0 > b.1),
+        ">=" => order(!nan && a.0 >= b.1, a.1 < b.0),
+        "==" => order(!nan && same, apart),
+        _ => order(apart, !nan && same),
+    }
 }
 
 fn order(certain: bool, impossible: bool) -> Option<bool> {
@@ -197,17 +183,6 @@ fn order(certain: bool, impossible: bool) -> Option<bool> {
         (true, _) => Some(true),
         (_, true) => Some(false),
         _ => None,
-    }
-}
-
-fn holds(operator: &str, order: std::cmp::Ordering) -> bool {
-    match operator {
-        "<" => order.is_lt(),
-        ">" => order.is_gt(),
-        "<=" => order.is_le(),
-        ">=" => order.is_ge(),
-        "==" => order.is_eq(),
-        _ => order.is_ne(),
     }
 }
 

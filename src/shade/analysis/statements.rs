@@ -363,7 +363,7 @@ impl Walker<'_> {
             // Which round it is depends on what ends the loop.
             let which = walker.call().loops.last().map_or(control, |current| control | current.escape);
             let item_shape = match &sequence.shape {
-                Shape::Range(low, high) if low < high => Shape::Int(*low, high - 1),
+                Shape::Range { low, end, .. } if low < end => Shape::Int(*low, end - 1),
                 _ => Shape::Unknown,
             };
             let value = walker.value(item_shape, which);
@@ -378,8 +378,8 @@ impl Walker<'_> {
             return None;
         }
         match &sequence.shape {
-            Shape::Range(low, high) if high.saturating_sub(*low) <= MAX_UNROLLED as i64 => {
-                Some((*low..*high).map(|n| self.constant(Shape::Int(n, n))).collect())
+            Shape::Range { low, end, exact: true } if end.saturating_sub(*low) <= MAX_UNROLLED as i64 => {
+                Some((*low..*end).map(|n| self.constant(Shape::Int(n, n))).collect())
             }
             Shape::Array(items) if items.len() <= MAX_UNROLLED => Some(items.to_vec()),
             _ => None,

@@ -50,8 +50,12 @@ pub(crate) enum Shape {
     Texture(Option<TextureRef>),
     Record(Rc<Record>),
     Array(Rc<Vec<Abstract>>),
-    /// Integers from the first up to and without the second.
-    Range(i64, i64),
+    /// Integers from `low` up to and without `end`; if not `exact`, some run of these.
+    Range {
+        low: i64,
+        end: i64,
+        exact: bool,
+    },
     /// The argument of `surface`.
     Hit,
     /// What is known is only on which inputs it depends. Never holds a [`Shape::Hit`] whose inputs are not counted.
@@ -120,8 +124,8 @@ impl Vector {
 }
 
 impl Shape {
-    /// A parameter as a shape with identities from `fresh`.
-    pub fn from_value(value: &Value, fresh: &mut impl FnMut() -> Identity) -> Self {
+    /// A parameter as a shape with identities from `fresh`. A texture beyond the scene's table is none.
+    pub fn from_value(value: &Value, textures: usize, fresh: &mut impl FnMut() -> Identity) -> Self {
         match value {
             Value::Unit => Self::Unit,
             Value::Bool(b) => Self::Bool(Some(*b)),
@@ -131,19 +135,21 @@ impl Shape {
             Value::Vec3(v) => Self::exact_vector(&v.to_array()),
             Value::Vec4(v) => Self::exact_vector(&v.to_array()),
             Value::Text(text) => Self::Text(Some(text.as_str().into())),
-            Value::Texture(texture) => Self::Texture(Some(*texture)),
+            Value::Texture(texture) if texture.texture.index() < textures => Self::Texture(Some(*texture)),
+            Value::Texture(_) => Self::Unit,
             Value::Record(fields) => {
                 let fields = fields
                     .iter()
                     .map(|(key, value)| {
-                        let value = Abstract::constant(Self::from_value(value, fresh), fresh());
+                        let value = Abstract::constant(Self::from_value(value, textures, fresh), fresh());
                         (key.as_str().into(), Field::always(value, (0, 0)))
                     })
                     .collect();
                 Self::Record(Rc::new(Record { fields, is_params: false }))
             }
             Value::Array(items) => {
-                let items = items.iter().map(|item| Abstract::constant(Self::from_value(item, fresh), fresh()));
+                let items =
+                    items.iter().map(|item| Abstract::constant(Self::from_value(item, textures, fresh), fresh()));
                 Self::Array(Rc::new(items.collect()))
             }
         }
@@ -177,7 +183,8 @@ impl Shape {
     /// Whether it is exactly known: the same value at all hits.
     pub fn is_exact(&self) -> bool {
         match self {
-            Self::Unit | Self::Bool(Some(_)) | Self::Text(Some(_)) | Self::Texture(Some(_)) | Self::Range(..) => true,
+            Self::Unit | Self::Bool(Some(_)) | Self::Text(Some(_)) | Self::Texture(Some(_)) => true,
+            Self::Range { exact, .. } => *exact,
             Self::Int(low, high) => low == high,
             Self::Float(x) => x.value().is_some(),
             Self::Vector(vector) => vector.channels.iter().all(|c| c.value().is_some()),
@@ -320,7 +327,9 @@ impl Join<'_> {
             (Shape::Bool(x), Shape::Bool(y)) => Shape::Bool(x.filter(|_| x == y)),
             (Shape::Text(x), Shape::Text(y)) => Shape::Text(x.clone().filter(|_| x == y)),
             (Shape::Texture(x), Shape::Texture(y)) => Shape::Texture(x.filter(|_| x == y)),
-            (Shape::Range(..), Shape::Range(..)) if a == b => a.clone(),
+            (Shape::Range { low: low_a, end: end_a, .. }, Shape::Range { low: low_b, end: end_b, .. }) => {
+                Shape::Range { low: *low_a.min(low_b), end: *end_a.max(end_b), exact: a == b && a.is_exact() }
+            }
             (Shape::Int(low_a, high_a), Shape::Int(low_b, high_b)) => {
                 let (low, high) = ((*low_a).min(*low_b), (*high_a).max(*high_b));
                 Shape::Int(

@@ -90,8 +90,9 @@ pub(super) fn functions(ast: &AST) -> Functions {
     let mut functions = Functions::new();
     for function in ast.iter_functions() {
         let count = function.params.len();
-        // The engine does not let bodies out, but walks them.
-        let alone = ast.clone_functions_only_filtered(|_, _, _, name, n| name == function.name && n == count);
+        // The engine does not let bodies out, but walks them. (Its `clone_functions_only_filtered` would copy all.)
+        let mut alone = ast.clone_functions_only();
+        alone.retain_functions(|_, _, name, n| name == function.name && n == count);
         let mut body = Vec::new();
         alone.walk(&mut |path: &[ASTNode]| {
             if let [ASTNode::Stmt(statement)] = path {
@@ -111,8 +112,8 @@ pub(super) fn functions(ast: &AST) -> Functions {
 pub(super) struct Walker<'a> {
     pub functions: &'a Functions,
     pub textures: &'a [Arc<Texture>],
-    /// Constants of the script's top level, as `global::NAME`.
-    pub globals: BTreeMap<Rc<str>, Abstract>,
+    /// Bounds of the textures that were looked up, which cost a look at all pixels, by their index.
+    pub texture_bounds: BTreeMap<usize, Shape>,
     /// The innermost call is the last.
     pub calls: Vec<Call>,
     /// Inputs that were read.
@@ -135,7 +136,7 @@ impl<'a> Walker<'a> {
         Self {
             functions,
             textures,
-            globals: BTreeMap::new(),
+            texture_bounds: BTreeMap::new(),
             calls: vec![Call::default()],
             inputs: InputSet::empty(),
             findings: BTreeSet::new(),

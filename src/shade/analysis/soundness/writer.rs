@@ -1,143 +1,4 @@
-//! Whatever the analysis claims of a script must hold when the script runs: generated scripts are analysed and run on
-//! many inputs by an engine with a small library.
-
-use proptest::prelude::*;
-use rhai::{Dynamic, Engine, Map, Scope};
-use tusche::math::{Vec3, luminance};
-use tusche::shade::analysis::inputs::LIMIT;
-use tusche::shade::analysis::{Analysis, OutputFact};
-use tusche::shade::{InputSet, OutputSet, Value};
-
-use super::analysis;
-
-/// A hit with some of the inputs.
-#[derive(Clone, Copy, Debug)]
-struct Hit {
-    position: Vec3,
-    normal: Vec3,
-    irradiance: Vec3,
-    distance: f32,
-    curvature: f32,
-    time: f32,
-    object_id: i64,
-    polygon_id: i64,
-    front_facing: bool,
-    path_kind: u8,
-    light: f32,
-}
-
-#[derive(Clone, Copy)]
-struct Light {
-    visibility: f32,
-    direction: Vec3,
-}
-
-const PATH_KINDS: [&str; 4] = ["camera", "reflection", "refraction", "shadow"];
-
-/// The inputs that a [`Hit`] has.
-const VARIED: [InputSet; 11] = [
-    InputSet::POSITION,
-    InputSet::NORMAL,
-    InputSet::IRRADIANCE,
-    InputSet::DISTANCE,
-    InputSet::CURVATURE,
-    InputSet::TIME,
-    InputSet::OBJECT_ID,
-    InputSet::POLYGON_ID,
-    InputSet::FRONT_FACING,
-    InputSet::PATH_KIND,
-    InputSet::LIGHT,
-];
-
-impl Hit {
-    /// The same, with one input taken from another hit.
-    fn with(mut self, input: InputSet, from: &Self) -> Self {
-        match input {
-            InputSet::POSITION => self.position = from.position,
-            InputSet::NORMAL => self.normal = from.normal,
-            InputSet::IRRADIANCE => self.irradiance = from.irradiance,
-            InputSet::DISTANCE => self.distance = from.distance,
-            InputSet::CURVATURE => self.curvature = from.curvature,
-            InputSet::TIME => self.time = from.time,
-            InputSet::OBJECT_ID => self.object_id = from.object_id,
-            InputSet::POLYGON_ID => self.polygon_id = from.polygon_id,
-            InputSet::FRONT_FACING => self.front_facing = from.front_facing,
-            InputSet::PATH_KIND => self.path_kind = from.path_kind,
-            _ => self.light = from.light,
-        }
-        self
-    }
-}
-
-fn engine() -> Engine {
-    let mut engine = Engine::new();
-    engine.set_optimization_level(rhai::OptimizationLevel::None);
-    engine.set_max_operations(200_000);
-    engine.set_max_call_levels(32);
-    engine.set_max_expr_depths(0, 0);
-    engine
-        .register_type::<Hit>()
-        .register_get("position", |hit: &mut Hit| hit.position)
-        .register_get("normal", |hit: &mut Hit| hit.normal)
-        .register_get("irradiance", |hit: &mut Hit| hit.irradiance)
-        .register_get("distance", |hit: &mut Hit| hit.distance)
-        .register_get("curvature", |hit: &mut Hit| hit.curvature)
-        .register_get("time", |hit: &mut Hit| hit.time)
-        .register_get("object_id", |hit: &mut Hit| hit.object_id)
-        .register_get("polygon_id", |hit: &mut Hit| hit.polygon_id)
-        .register_get("front_facing", |hit: &mut Hit| hit.front_facing)
-        .register_get("path_kind", |hit: &mut Hit| PATH_KINDS[usize::from(hit.path_kind) % 4].to_owned())
-        .register_fn("light", |hit: &mut Hit, i: i64| Light {
-            visibility: if i == 0 { hit.light } else { 1.0 - hit.light },
-            direction: Vec3::X,
-        })
-        .register_get("visibility", |light: &mut Light| light.visibility)
-        .register_get("direction", |light: &mut Light| light.direction);
-    engine
-        .register_type::<Vec3>()
-        .register_get_set("x", |v: &mut Vec3| v.x, |v: &mut Vec3, x: f32| v.x = x)
-        .register_get_set("y", |v: &mut Vec3| v.y, |v: &mut Vec3, y: f32| v.y = y)
-        .register_get_set("z", |v: &mut Vec3| v.z, |v: &mut Vec3, z: f32| v.z = z)
-        .register_get("zxy", |v: &mut Vec3| Vec3::new(v.z, v.x, v.y))
-        .register_fn("vec3", Vec3::new)
-        .register_fn("vec3", Vec3::splat)
-        .register_fn("+", |a: Vec3, b: Vec3| a + b)
-        .register_fn("-", |a: Vec3, b: Vec3| a - b)
-        .register_fn("*", |a: Vec3, b: Vec3| a * b)
-        .register_fn("/", |a: Vec3, b: Vec3| a / b)
-        .register_fn("*", |a: Vec3, b: f32| a * b)
-        .register_fn("*", |a: f32, b: Vec3| a * b)
-        .register_fn("/", |a: Vec3, b: f32| a / b)
-        .register_fn("-", |a: Vec3| -a)
-        .register_fn("abs", |a: Vec3| a.abs())
-        .register_fn("dot", |a: Vec3, b: Vec3| a.dot(b))
-        .register_fn("cross", |a: Vec3, b: Vec3| a.cross(b))
-        .register_fn("length", |a: Vec3| a.length())
-        .register_fn("distance", |a: Vec3, b: Vec3| a.distance(b))
-        .register_fn("normalize", |a: Vec3| a.normalize())
-        .register_fn("reflect", |a: Vec3, n: Vec3| a - 2.0 * a.dot(n) * n)
-        .register_fn("luminance", luminance)
-        .register_fn("mix", |a: Vec3, b: Vec3, t: f32| a.lerp(b, t));
-    engine
-        .register_fn("clamp", |x: f32, a: f32, b: f32| x.max(a).min(b))
-        .register_fn("saturate", |x: f32| if x.is_nan() { x } else { x.clamp(0.0, 1.0) })
-        .register_fn("mix", |a: f32, b: f32, t: f32| a + (b - a) * t)
-        .register_fn("step", |edge: f32, x: f32| if x < edge { 0.0_f32 } else { 1.0 })
-        .register_fn("smoothstep", |a: f32, b: f32, x: f32| {
-            let t = (x - a) / (b - a);
-            let t = if t.is_nan() { t } else { t.clamp(0.0, 1.0) };
-            t * t * (3.0 - 2.0 * t)
-        })
-        .register_fn("remap", |x: f32, a: f32, b: f32, c: f32, d: f32| c + (d - c) * ((x - a) / (b - a)))
-        .register_fn("fract", |x: f32| x - x.floor())
-        .register_fn("mod", |a: f32, b: f32| a - b * (a / b).floor())
-        .register_fn("pow", |a: f32, b: f32| a.powf(b))
-        .register_fn("sign", |x: f32| x.signum())
-        .register_fn("hash", |x: f32| (x.to_bits().wrapping_mul(0x9E37_79B9) >> 8) as f32 / 16_777_216.0)
-        .register_fn("native", |x: f32| x * 3.0 - 1.0)
-        .register_fn("native", |hit: Hit| hit.curvature);
-    engine
-}
+//! Scripts at random: every construct that the analysis follows, and values that try its bounds.
 
 /// Writes a script; every choice is the next byte, and bytes that have run out choose the simplest form.
 struct Writer<'a> {
@@ -194,6 +55,7 @@ impl Writer<'_> {
         let count = 1 + self.choose(6);
         let body = self.statements(count, 3);
         let end = self.outputs(2);
+        script += "fn facing(hit) { max(0.0, dot(hit.normal, hit.light(0).direction)) }\n";
         format!("{script}fn surface(hit, p) {{ let out = #{{}}; {body} {end} }}")
     }
 
@@ -413,7 +275,7 @@ impl Writer<'_> {
             };
         }
         let d = depth - 1;
-        match self.choose(24) {
+        match self.choose(27) {
             0 | 1 => self.float(0),
             2..=6 => {
                 let operator = ["+", "-", "*", "/", "%"][usize::from(self.choose(5))];
@@ -430,7 +292,7 @@ impl Writer<'_> {
             10 => format!("step({}, {})", self.expression(Type::Float, d), self.expression(Type::Float, d)),
             11 => format!("smoothstep({}, {}, {})", self.float(0), self.float(0), self.expression(Type::Float, d)),
             12 => {
-                let name = ["sqrt", "abs", "floor", "sin", "exp", "ln"][usize::from(self.choose(6))];
+                let name = ["sqrt", "abs", "floor", "sin", "exp", "ln", "degrees"][usize::from(self.choose(7))];
                 format!("{name}({})", self.expression(Type::Float, d))
             }
             13 => {
@@ -438,7 +300,7 @@ impl Writer<'_> {
                 format!("{name}({})", self.expression(Type::Float, d))
             }
             14 => {
-                let name = ["min", "max", "mod", "pow"][usize::from(self.choose(4))];
+                let name = ["min", "max", "mod", "pow", "atan"][usize::from(self.choose(5))];
                 format!("{name}({}, {})", self.expression(Type::Float, d), self.expression(Type::Float, d))
             }
             15 => format!("dot({}, {})", self.expression(Type::Vector, d), self.expression(Type::Vector, d)),
@@ -450,7 +312,16 @@ impl Writer<'_> {
             18 => format!("remap({}, 0.5, 2.0, {}, {})", self.expression(Type::Float, d), self.float(0), self.float(0)),
             19 => format!("({} * {})", self.expression(Type::Int, d), self.float(0)),
             20 if self.has_hit => format!("hit.light({}).visibility", self.choose(2)),
-            21 if self.has_hit => "native(hit)".into(),
+            21 if self.has_hit => {
+                ["native(hit)", "hit.texture(p.map).g", "facing(hit)"][usize::from(self.choose(3))].into()
+            }
+            23 => format!("fbm({}, 2)", self.expression(Type::Vector, d)),
+            24 => format!(
+                "ramp({}, [[0.0, {}], [1.0, {}]])",
+                self.expression(Type::Float, d),
+                self.float(0),
+                self.float(0)
+            ),
             22 => format!("saturate({}).abs()", self.expression(Type::Float, d)),
             _ => format!("(-({}))", self.expression(Type::Float, d)),
         }
@@ -473,7 +344,7 @@ impl Writer<'_> {
             return match self.choose(4) {
                 0 if self.has_hit => "hit.front_facing".into(),
                 1 if self.has_hit => "hit.path_kind == \"camera\"".into(),
-                2 if self.has_hit => ["p.texture != ()", "p.on"][usize::from(self.choose(2))].into(),
+                2 if self.has_hit => ["p.none != ()", "p.on", "p.map != ()"][usize::from(self.choose(3))].into(),
                 _ => self.variable(Type::Bool).unwrap_or_else(|| "true".into()),
             };
         }
@@ -496,14 +367,14 @@ impl Writer<'_> {
     fn vector(&mut self, depth: u8) -> String {
         if depth == 0 {
             return match self.choose(3) {
-                0 if self.has_hit => {
-                    ["hit.normal", "hit.position", "hit.irradiance"][usize::from(self.choose(3))].into()
-                }
+                0 if self.has_hit => ["hit.normal", "hit.position", "hit.irradiance", "vec3(hit.uv, 0.5)"]
+                    [usize::from(self.choose(4))]
+                .into(),
                 _ => self.variable(Type::Vector).unwrap_or_else(|| "vec3(0.25, 0.5, 1.0)".into()),
             };
         }
         let d = depth - 1;
-        match self.choose(12) {
+        match self.choose(16) {
             0..=3 => {
                 let operator = ["+", "-", "*", "/"][usize::from(self.choose(4))];
                 format!("({} {operator} {})", self.expression(Type::Vector, d), self.expression(Type::Vector, d))
@@ -515,12 +386,20 @@ impl Writer<'_> {
             8 => format!("cross({}, {})", self.expression(Type::Vector, d), self.expression(Type::Vector, d)),
             9 => format!("reflect({}, {})", self.expression(Type::Vector, d), self.vector(0)),
             10 => format!("{}.zxy", self.expression(Type::Vector, d)),
+            11 => format!("refract({}, {}, {})", self.expression(Type::Vector, d), self.vector(0), self.float(0)),
+            12 => {
+                let arguments = (self.float(0), self.float(0), self.expression(Type::Float, d));
+                format!("hsv({}, saturate({}), {})", arguments.0, arguments.1, arguments.2)
+            }
+            13 => format!("clamp({}, {}, {})", self.expression(Type::Vector, d), self.float(0), self.vector(0)),
+            14 => format!("hash_color({})", self.expression(Type::Int, d)),
             _ => format!("abs({})", self.expression(Type::Vector, d)),
         }
     }
 }
 
-fn write_script(choices: &[u8]) -> String {
+/// The script that these choices spell.
+pub(super) fn script(choices: &[u8]) -> String {
     Writer {
         choices: choices.iter(),
         variables: Vec::new(),
@@ -532,141 +411,4 @@ fn write_script(choices: &[u8]) -> String {
         this: None,
     }
     .script()
-}
-
-fn number(limit: f32) -> impl Strategy<Value = f32> {
-    prop_oneof![
-        4 => -2.0..2.0_f32,
-        1 => -1e3..1e3_f32,
-        3 => prop::sample::select(vec![0.0, -0.0, 1.0, -1.0, 0.5, 1e-30, f32::MIN_POSITIVE, 1e9, limit, -limit]),
-    ]
-}
-
-fn positive(limit: f32) -> impl Strategy<Value = f32> {
-    number(limit).prop_map(f32::abs)
-}
-
-fn vector(limit: f32) -> impl Strategy<Value = Vec3> {
-    (number(limit), number(limit), number(limit)).prop_map(Vec3::from)
-}
-
-fn hit() -> impl Strategy<Value = Hit> {
-    let vectors = (vector(LIMIT), vector(1.0), vector(LIMIT));
-    let floats = (positive(LIMIT), number(LIMIT), number(LIMIT), 0.0..=1.0_f32);
-    let ints = (prop_oneof![1..6_i64, Just(i64::from(u32::MAX))], 0..6_i64);
-    (vectors, floats, ints, any::<bool>(), any::<u8>()).prop_map(|(vectors, floats, ints, front_facing, path_kind)| {
-        Hit {
-            position: vectors.0,
-            normal: vectors.1.try_normalize().unwrap_or(Vec3::Z),
-            irradiance: vectors.2.abs(),
-            distance: floats.0,
-            curvature: floats.1,
-            time: floats.2,
-            light: floats.3,
-            object_id: ints.0,
-            polygon_id: ints.1,
-            front_facing,
-            path_kind,
-        }
-    })
-}
-
-fn params() -> Map {
-    let mut map = Map::new();
-    map.insert("half".into(), 0.5_f32.into());
-    map.insert("three".into(), 3_i64.into());
-    map.insert("on".into(), true.into());
-    map.insert("texture".into(), Dynamic::UNIT);
-    map
-}
-
-fn run(engine: &Engine, ast: &rhai::AST, hit: Hit) -> Option<Map> {
-    let result = engine.call_fn::<Dynamic>(&mut Scope::new(), ast, "surface", (hit, params())).ok()?;
-    Some(result.try_cast::<Map>().expect("scripts return records"))
-}
-
-fn channels(value: &Dynamic) -> Vec<f32> {
-    if let Ok(x) = value.as_float() {
-        vec![x]
-    } else if let Ok(n) = value.as_int() {
-        vec![n as f32]
-    } else {
-        value.clone().try_cast::<Vec3>().expect("outputs are numbers and vectors").to_array().to_vec()
-    }
-}
-
-fn facts(found: &Analysis) -> Vec<(String, OutputFact)> {
-    let outputs = OutputSet::all().iter_names().map(|(name, flag)| (name.to_lowercase(), found.output(flag).clone()));
-    outputs.chain(found.aovs.iter().map(|(name, fact)| (format!("aov_{name}"), fact.clone()))).collect()
-}
-
-fn check(script: &str, hits: &[Hit]) -> Result<bool, TestCaseError> {
-    let values =
-        [("half", Value::Float(0.5)), ("three", Value::Int(3)), ("on", Value::Bool(true)), ("texture", Value::Unit)];
-    let found = analysis(script, &values);
-    let engine = engine();
-    let ast = engine.compile(script).map_err(|error| TestCaseError::fail(format!("{error}\n{script}")))?;
-    if !found.complete {
-        return Ok(false);
-    }
-    let facts = facts(&found);
-    let fail = |what: String| Err(TestCaseError::fail(format!("{what}\n{script}\n{found}")));
-    for (i, hit) in hits.iter().enumerate() {
-        let Some(outputs) = run(&engine, &ast, *hit) else { continue };
-        for key in outputs.keys() {
-            if !facts.iter().any(|(name, fact)| name == key.as_str() && fact.may) {
-                return fail(format!("`{key}` is written at {hit:?}"));
-            }
-        }
-        for (name, fact) in &facts {
-            let Some(value) = outputs.get(name.as_str()) else {
-                if fact.always {
-                    return fail(format!("`{name}` is not written at {hit:?}"));
-                }
-                continue;
-            };
-            let value = channels(value);
-            if let Some([low, high]) = fact.range
-                && !value.iter().all(|x| (low..=high).contains(x))
-            {
-                return fail(format!("`{name}` is {value:?} at {hit:?}"));
-            }
-            let constant = match &fact.constant {
-                Some(Value::Float(x)) => Some(vec![*x]),
-                Some(Value::Int(n)) => Some(vec![*n as f32]),
-                Some(Value::Vec3(v)) => Some(v.to_array().to_vec()),
-                Some(other) => return fail(format!("`{name}` is said to be {other:?}")),
-                None => None,
-            };
-            if constant.is_some_and(|constant| constant != value) {
-                return fail(format!("`{name}` is {value:?} at {hit:?}"));
-            }
-        }
-        let other = &hits[(i + 1) % hits.len()];
-        for input in VARIED {
-            let Some(varied) = run(&engine, &ast, hit.with(input, other)) else { continue };
-            for (name, fact) in facts.iter().filter(|(_, fact)| !fact.inputs.contains(input)) {
-                let values = |outputs: &Map| outputs.get(name.as_str()).map(channels);
-                // NaN is not equal to itself, but nothing has changed.
-                let same = match (values(&outputs), values(&varied)) {
-                    (Some(a), Some(b)) => a.iter().zip(&b).all(|(a, b)| a == b || a.is_nan() && b.is_nan()),
-                    (a, b) => a.is_none() && b.is_none(),
-                };
-                if !same {
-                    let _ = fact;
-                    return fail(format!("`{name}` depends on {input:?}, from {hit:?} to {other:?}"));
-                }
-            }
-        }
-    }
-    Ok(true)
-}
-
-proptest! {
-    #![proptest_config(ProptestConfig { cases: 2000, failure_persistence: None, ..ProptestConfig::default() })]
-
-    #[test]
-    fn facts_hold(choices in prop::collection::vec(any::<u8>(), 0..300), hits in prop::collection::vec(hit(), 6)) {
-        check(&write_script(&choices), &hits)?;
-    }
 }
