@@ -2,6 +2,7 @@
 
 mod goldens;
 mod meaning;
+mod models;
 mod overrides;
 mod schema;
 mod shapes;
@@ -19,7 +20,22 @@ fn store(scene: &str) -> FileStore {
         .with_file("scene.toml", scene)
         .with_file("ink.rhai", "fn surface(hit, p) { #{} }")
         .with_file("white.png", white_png())
+        .with_file("stage.gltf", STAGE)
 }
+
+/// A model of a camera and a lamp, with nothing to see.
+const STAGE: &str = r#"{
+    "asset": { "version": "2.0" },
+    "scene": 0,
+    "scenes": [{ "nodes": [0, 1] }],
+    "nodes": [
+        { "name": "Shot", "camera": 0, "translation": [0, 0, 5] },
+        { "name": "Lamp", "translation": [0, 2, 0], "extensions": { "KHR_lights_punctual": { "light": 0 } } }
+    ],
+    "cameras": [{ "type": "perspective", "perspective": { "yfov": 0.5, "znear": 0.1 } }],
+    "extensionsUsed": ["KHR_lights_punctual"],
+    "extensions": { "KHR_lights_punctual": { "lights": [{ "type": "point", "intensity": 40 }] } }
+}"#;
 
 /// A picture of one white pixel.
 fn white_png() -> Vec<u8> {

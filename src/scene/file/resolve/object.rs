@@ -8,7 +8,7 @@ use super::super::format::{self, Segments, Size};
 use super::material::about_file;
 use super::transform::world_from_object;
 use super::{ModelCamera, Resolver};
-use crate::diag::Diagnostic;
+use crate::diag::{Diagnostic, Diagnostics, Span};
 use crate::scene::Object;
 use crate::scene::gltf::{self, ModelTime, Placement};
 use crate::scene::ids::MeshId;
@@ -93,16 +93,20 @@ impl Resolver<'_> {
         };
         match gltf::import(&path, self.context.files, time, &mut self.scene, &placement) {
             Ok(imported) => {
-                self.faults.extend(imported.warnings);
+                self.model_faults(imported.warnings, &span);
                 let cameras = imported.cameras.into_iter();
                 self.model_cameras.extend(cameras.map(|camera| ModelCamera { model: name.clone(), camera }));
                 imported.lights
             }
             Err(faults) => {
-                faults.0.into_iter().for_each(|fault| self.faults.push(about_file(fault, &span)));
+                self.model_faults(faults, &span);
                 Vec::new()
             }
         }
+    }
+
+    fn model_faults(&mut self, faults: Diagnostics, span: &Span) {
+        faults.0.into_iter().for_each(|fault| self.faults.push(about_file(fault, span)));
     }
 
     fn shape(&mut self, kind: format::Shape, object: &format::Object, node: &Node, name: String) {
