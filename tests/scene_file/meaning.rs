@@ -251,6 +251,19 @@ fn files_that_cannot_be_used_are_faults_of_the_line_that_names_them() {
     assert!(lines.last().unwrap().contains("`radius` belongs to a shape, not to a model"), "{faults}");
 }
 
+#[test]
+fn a_file_of_another_kind_is_told_in_few_words() {
+    let faults = load_with(&"<scene> = \n".repeat(20_000), &[], &LoadOptions::default()).unwrap_err();
+    assert_eq!(faults.0.len(), 41);
+    assert_eq!(faults.0[40].to_string(), "error: scene.toml: 19960 more lines are not valid TOML");
+}
+
+#[test]
+fn endless_nesting_is_no_stack_overflow() {
+    let faults = load_with(&format!("a = {}", "[".repeat(100_000)), &[], &LoadOptions::default()).unwrap_err();
+    assert!(faults.to_string().contains("max recursion depth"), "{faults}");
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 400, failure_persistence: None, ..ProptestConfig::default() })]
 

@@ -60,7 +60,7 @@ fn lights_of_models_shine_unless_the_file_has_its_own() {
         stage(&format!("{STAGE}{extra}"), None).lights.into_iter().map(|light| light.kind).collect()
     };
     let own = "[[lights]]\nkind = \"point\"\nposition = [0, 9, 0]\n";
-    assert_eq!(kinds(""), [lamp.clone()]);
+    assert_eq!(kinds(""), std::slice::from_ref(&lamp));
     assert_eq!(kinds(own).len(), 1);
     assert_ne!(kinds(own)[0], lamp);
     assert_eq!(kinds(&format!("lights = true\n{own}"))[1], lamp);

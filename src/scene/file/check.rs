@@ -107,26 +107,27 @@ impl<'a> Walk<'a> {
         let of_kind: Vec<&'a Json> = options.iter().filter(|option| self.kind_fits(&node.value, option)).collect();
         match (&node.value, &of_kind[..]) {
             (_, []) => self.mismatch(node, schema, path),
-            (Value::Table(table), _) => {
-                let table: &Table = table;
-                let likeness = |option: &Json| {
-                    let known = &follow(self.root, option)["properties"];
-                    table.entries.iter().filter(|entry| known.get(&entry.key).is_some()).count()
-                };
-                // The first of the most alike: `max_by_key` takes the last.
-                let closest = of_kind.iter().rev().copied().max_by_key(|option| likeness(option));
-                let any = closest.filter(|option| likeness(option) > 0 || of_kind.len() == 1);
-                match any {
-                    Some(option) => self.node(node, option, path),
-                    None => self.mismatch(node, schema, path),
-                }
-            }
+            (Value::Table(table), _) => match self.most_alike(table, &of_kind) {
+                Some(option) => self.node(node, option, path),
+                None => self.mismatch(node, schema, path),
+            },
             (Value::Array(_), [option, ..]) => self.node(node, option, path),
             (value, _) if of_kind.iter().any(|option| self.scalar_fits(value, option)) => true,
             // Of a number, only its size can be wrong: what else could stand there is no help.
             (Value::Int(_) | Value::Float(_), [option, ..]) => self.mismatch(node, option, path),
             _ => self.mismatch(node, schema, path),
         }
+    }
+
+    /// The alternative that shares most keys with a table, the first of equals; `None` if it could be any of several.
+    fn most_alike(&self, table: &Table, options: &[&'a Json]) -> Option<&'a Json> {
+        let shared = |option: &Json| {
+            let known = &follow(self.root, option)["properties"];
+            table.entries.iter().filter(|entry| known.get(&entry.key).is_some()).count()
+        };
+        // `max_by_key` takes the last of equals.
+        let closest = options.iter().rev().copied().max_by_key(|option| shared(option));
+        closest.filter(|option| shared(option) > 0 || options.len() == 1)
     }
 
     /// The property whose constant tells the alternatives apart, if each has one.
@@ -155,11 +156,7 @@ impl<'a> Walk<'a> {
                 self.faults.push(fault.at(value.span.clone()));
                 false
             }
-            None => {
-                let fault = format!("`{inner}`: expected a string, found {}", found(&value.value));
-                self.faults.push(Diagnostic::error(fault).at(value.span.clone()));
-                false
-            }
+            None => self.expected("a string", value, &inner),
         }
     }
 
