@@ -51,13 +51,16 @@ impl<'a> Walk<'a> {
         match &mut node.value {
             Value::Table(_) => self.table(node, schema, path),
             Value::Array(_) => self.array(node, schema, path),
-            value => scalar_fits(value, schema) || self.mismatch(node, schema, path),
+            value => self.scalar_fits(value, schema) || self.mismatch(node, schema, path),
         }
     }
 
     fn mismatch(&mut self, node: &Node, schema: &Json, path: &str) -> bool {
-        let expected = describe(self.root, schema);
-        let message = format!("`{path}`: expected {expected}, found {}", found(&node.value));
+        self.expected(&describe(self.root, schema), node, path)
+    }
+
+    fn expected(&mut self, what: &str, node: &Node, path: &str) -> bool {
+        let message = format!("`{path}`: expected {what}, found {}", found(&node.value));
         self.faults.push(Diagnostic::error(message).at(node.span.clone()));
         false
     }
@@ -77,6 +80,23 @@ impl<'a> Walk<'a> {
         }
     }
 
+    /// Whether a scalar has the kind and a value that a schema asks for.
+    fn scalar_fits(&self, value: &Value, schema: &Json) -> bool {
+        let schema = follow(self.root, schema);
+        if let Some(options) = alternatives(schema) {
+            return options.iter().any(|option| self.scalar_fits(value, option));
+        }
+        let allowed = |value: Json| schema.get("const").is_none_or(|constant| *constant == value);
+        self.kind_fits(value, schema)
+            && match value {
+                Value::Bool(value) => allowed((*value).into()),
+                Value::String(text) => allowed(text.as_str().into()),
+                Value::Int(value) => in_bounds(*value as f64, schema),
+                Value::Float(value) => in_bounds(*value, schema),
+                Value::Datetime(_) | Value::Array(_) | Value::Table(_) => false,
+            }
+    }
+
     fn one_of(&mut self, node: &mut Node, schema: &'a Json, options: &'a [Json], path: &str) -> bool {
         if let Some(tag) = self.tag(options) {
             return self.tagged(node, schema, options, tag, path);
@@ -87,26 +107,27 @@ impl<'a> Walk<'a> {
         let of_kind: Vec<&'a Json> = options.iter().filter(|option| self.kind_fits(&node.value, option)).collect();
         match (&node.value, &of_kind[..]) {
             (_, []) => self.mismatch(node, schema, path),
-            (Value::Table(table), _) => {
-                let table: &Table = table;
-                let likeness = |option: &Json| {
-                    let known = &follow(self.root, option)["properties"];
-                    table.entries.iter().filter(|entry| known.get(&entry.key).is_some()).count()
-                };
-                // The first of the most alike: `max_by_key` takes the last.
-                let closest = of_kind.iter().rev().copied().max_by_key(|option| likeness(option));
-                let any = closest.filter(|option| likeness(option) > 0 || of_kind.len() == 1);
-                match any {
-                    Some(option) => self.node(node, option, path),
-                    None => self.mismatch(node, schema, path),
-                }
-            }
+            (Value::Table(table), _) => match self.most_alike(table, &of_kind) {
+                Some(option) => self.node(node, option, path),
+                None => self.mismatch(node, schema, path),
+            },
             (Value::Array(_), [option, ..]) => self.node(node, option, path),
-            (value, _) => {
-                let fits = of_kind.iter().any(|option| scalar_fits(value, follow(self.root, option)));
-                fits || self.mismatch(node, schema, path)
-            }
+            (value, _) if of_kind.iter().any(|option| self.scalar_fits(value, option)) => true,
+            // Of a number, only its size can be wrong: what else could stand there is no help.
+            (Value::Int(_) | Value::Float(_), [option, ..]) => self.mismatch(node, option, path),
+            _ => self.mismatch(node, schema, path),
         }
+    }
+
+    /// The alternative that shares most keys with a table, the first of equals; `None` if it could be any of several.
+    fn most_alike(&self, table: &Table, options: &[&'a Json]) -> Option<&'a Json> {
+        let shared = |option: &Json| {
+            let known = &follow(self.root, option)["properties"];
+            table.entries.iter().filter(|entry| known.get(&entry.key).is_some()).count()
+        };
+        // `max_by_key` takes the last of equals.
+        let closest = options.iter().rev().copied().max_by_key(|option| shared(option));
+        closest.filter(|option| shared(option) > 0 || options.len() == 1)
     }
 
     /// The property whose constant tells the alternatives apart, if each has one.
@@ -135,11 +156,7 @@ impl<'a> Walk<'a> {
                 self.faults.push(fault.at(value.span.clone()));
                 false
             }
-            None => {
-                let message = format!("`{inner}`: expected a string, found {}", found(&value.value));
-                self.faults.push(Diagnostic::error(message).at(value.span.clone()));
-                false
-            }
+            None => self.expected("a string", value, &inner),
         }
     }
 
@@ -166,7 +183,7 @@ impl<'a> Walk<'a> {
                     self.node(&mut entry.node, property, &inner)
                 }
                 (None, _) => {
-                    let fault = self.unknown_key(&entry.key, schema, path);
+                    let fault = self.unknown_key(&entry.key, &entry.node.value, schema, path);
                     self.faults.push(fault.at(entry.key_span.clone()));
                     false
                 }
@@ -188,15 +205,16 @@ impl<'a> Walk<'a> {
         absent.is_empty()
     }
 
-    fn unknown_key(&self, key: &str, schema: &Json, path: &str) -> Diagnostic {
+    fn unknown_key(&self, key: &str, value: &Value, schema: &Json, path: &str) -> Diagnostic {
         if let Some(instead) = schema["x-planned"][key].as_str() {
             return Diagnostic::error(format!("`{key}` is not built yet")).hint(instead);
         }
         let known = || schema["properties"].as_object().into_iter().flatten().map(|(key, _)| key.as_str());
-        let fault = match path {
-            "" => Diagnostic::error(format!("unknown table `{key}`")),
-            _ => Diagnostic::error(format!("unknown key `{key}` in `{path}`")),
-        };
+        let fault = Diagnostic::error(match (path, value) {
+            ("", Value::Table(_) | Value::Array(_)) => format!("unknown table `{key}`"),
+            ("", _) => format!("unknown key `{key}` outside of all tables"),
+            _ => format!("unknown key `{key}` in `{path}`"),
+        });
         if let Some(near) = nearest(key, known()) {
             return fault.hint(format!("did you mean `{near}`?"));
         }
@@ -228,15 +246,7 @@ impl<'a> Walk<'a> {
     }
 }
 
-/// Whether a scalar of the right kind has an allowed value.
-fn scalar_fits(value: &Value, schema: &Json) -> bool {
-    let number = match value {
-        Value::Bool(value) => return schema.get("const").is_none_or(|constant| constant == value),
-        Value::String(text) => return schema.get("const").is_none_or(|constant| constant == text.as_str()),
-        Value::Int(value) => *value as f64,
-        Value::Float(value) => *value,
-        _ => return true,
-    };
+fn in_bounds(number: f64, schema: &Json) -> bool {
     let holds = |keyword: &str, test: fn(f64, f64) -> bool| schema[keyword].as_f64().is_none_or(|b| test(number, b));
     number.is_finite()
         && holds("minimum", |n, bound| n >= bound)

@@ -92,6 +92,9 @@ impl Node {
     }
 }
 
+/// More faulty lines than this are counted, not told: the file is not TOML at all.
+const MOST_TOLD: usize = 40;
+
 /// Parses a whole file.
 ///
 /// # Errors
@@ -113,20 +116,27 @@ pub(super) fn parse_value(source: &Arc<Source>, offset: usize) -> Result<Node, D
     if faults.is_empty() { Ok(node) } else { Err(faults) }
 }
 
-fn syntax_errors(source: &Arc<Source>, offset: usize, mut errors: Vec<toml::de::Error>) -> Diagnostics {
-    let start = |error: &toml::de::Error| error.span().map_or(0, |range| range.start + offset);
-    errors.sort_by_key(start);
-    errors.dedup_by_key(|error| source.line_column(start(error)).0);
-    Diagnostics(
-        errors
-            .into_iter()
-            .map(|error| {
-                let range = error.span().unwrap_or_default();
-                Diagnostic::error(format!("this is not valid TOML: {}", error.message()))
-                    .at(Span::new(source, range.start + offset..range.end + offset))
-            })
-            .collect(),
-    )
+fn syntax_errors(source: &Arc<Source>, offset: usize, errors: Vec<toml::de::Error>) -> Diagnostics {
+    let mut places: Vec<_> = errors
+        .iter()
+        .map(|error| {
+            let range = error.span().unwrap_or_default();
+            (range.start + offset..range.end + offset, error.message())
+        })
+        .collect();
+    places.sort_by_key(|(range, _)| range.start);
+    let bytes = source.text.as_bytes();
+    places.dedup_by(|(next, _), (kept, _)| !bytes[kept.start..next.start].contains(&b'\n'));
+    let untold = places.len().saturating_sub(MOST_TOLD);
+    places.truncate(MOST_TOLD);
+    let mut faults = Diagnostics::default();
+    for (range, message) in places {
+        faults.push(Diagnostic::error(format!("this is not valid TOML: {message}")).at(Span::new(source, range)));
+    }
+    if untold > 0 {
+        faults.push(Diagnostic::error(format!("{}: {untold} more lines are not valid TOML", source.name)));
+    }
+    faults
 }
 
 /// Turns the parser's tree into ours; numbers that do not fit are faults.

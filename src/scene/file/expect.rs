@@ -45,7 +45,10 @@ fn bounds(schema: &Json) -> String {
 }
 
 fn describe_array(root: &Json, schema: &Json) -> String {
-    let items = match follow(root, &schema["items"])["type"].as_str() {
+    let item = follow(root, &schema["items"]);
+    // Of alternatives, all are of one kind.
+    let item = alternatives(item).and_then(|options| options.first()).unwrap_or(item);
+    let items = match item["type"].as_str() {
         Some("number") => "numbers",
         Some("integer") => "whole numbers",
         Some("object") => "tables",
@@ -82,7 +85,11 @@ pub(super) fn found(value: &Value) -> String {
             0 => "an empty array".to_owned(),
             n => format!("an array of {n}"),
         },
-        Value::Table(_) => "a table".to_owned(),
+        Value::Table(table) => match &table.entries[..] {
+            [] => "an empty table".to_owned(),
+            [entry] => format!("a table with `{}`", entry.key),
+            _ => "a table".to_owned(),
+        },
     }
 }
 

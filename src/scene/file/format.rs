@@ -36,7 +36,7 @@ pub(super) struct SceneFile {
     pub materials: BTreeMap<String, Material>,
     /// The objects: models and built-in shapes with a place in the world.
     pub objects: Vec<Object>,
-    /// The lights. Without any, those of the models are used, and failing those, a default set.
+    /// The lights. Without any, those of the models are used, and failing those, a default set; `lights = []` is dark.
     pub lights: Vec<Light>,
 }
 

@@ -44,7 +44,7 @@ pub struct LoadOptions {
 ///
 /// # Errors
 /// Everything that is wrong with the file, the overrides and the files it names, warnings included: errors of the
-/// scene file in its order, then those of the overrides, then those without a place.
+/// scene file in its order, then those of the overrides, then those of other files or without a place.
 pub fn load(
     path: &Path,
     files: &FileStore,
@@ -77,9 +77,11 @@ pub fn load(
     let folder = path.parent().unwrap_or(Path::new(""));
     let context = resolve::Context { files, options, source: &source, folder };
     let builder = resolve::resolve(&written, &document, context, &mut faults);
-    faults.0.sort_by_key(|fault| match &fault.span {
-        Some(span) => (span.source != source, span.range.start),
-        None => (true, usize::MAX),
+    let sources: Vec<_> = std::iter::once(&source).chain(overrides.iter().map(Override::source)).collect();
+    faults.0.sort_by_key(|fault| {
+        let span = fault.span.as_ref();
+        let file = span.and_then(|span| sources.iter().position(|source| Arc::ptr_eq(source, &span.source)));
+        (file.unwrap_or(sources.len()), span.map_or(0, |span| span.range.start))
     });
     if faults.has_errors() { Err(faults) } else { Ok((builder, faults)) }
 }

@@ -14,6 +14,7 @@ use crate::diag::{Diagnostic, Diagnostics, Source, Span, nearest};
 /// `name`. The value is a TOML value; a word that is not one is taken as a string.
 #[derive(Clone, Debug)]
 pub struct Override {
+    source: Arc<Source>,
     path: Vec<(String, Span)>,
     value: Node,
 }
@@ -51,7 +52,12 @@ impl Override {
                 Node { span: Span::new(&source, start..start + word.len()), value: Value::String(word.to_owned()) }
             }
         };
-        Ok(Self { path, value })
+        Ok(Self { source, path, value })
+    }
+
+    /// What was typed, which places in messages point into.
+    pub(super) fn source(&self) -> &Arc<Source> {
+        &self.source
     }
 
     /// Puts the value into a document.

@@ -44,8 +44,31 @@ pub fn import(
     into: &mut SceneBuilder,
     placement: &Placement,
 ) -> Result<Imported, Diagnostics> {
-    let _ = (path, files, time, placement);
-    files.read(path)?;
-    let n = into.objects.len();
-    Ok(Imported { objects: n..n, cameras: Vec::new(), lights: Vec::new(), warnings: Diagnostics::default() })
+    let bytes = files.read(path)?;
+    let json: serde_json::Value = serde_json::from_slice(&bytes).unwrap_or_default();
+    let _ = time;
+    let mut imported = Imported {
+        objects: into.objects.len()..into.objects.len(),
+        cameras: Vec::new(),
+        lights: Vec::new(),
+        warnings: Diagnostics::default(),
+    };
+    for node in json["nodes"].as_array().into_iter().flatten() {
+        let name = node["name"].as_str().unwrap_or_default().to_owned();
+        let at = |i: usize| node["translation"][i].as_f64().unwrap_or(0.0);
+        let position = placement.world_from_model.transform_point3(crate::math::DVec3::new(at(0), at(1), at(2)));
+        if node["camera"].is_number() {
+            imported.cameras.push(Camera {
+                name: name.clone(),
+                projection: super::camera::Projection::Perspective { fov_y: 0.5 },
+                position,
+                world_from_camera: crate::math::DMat3::IDENTITY,
+            });
+        }
+        if node["extensions"].is_object() {
+            let kind = super::light::LightKind::Point { position, intensity: crate::math::Vec3::splat(40.0) };
+            imported.lights.push(Light { name, kind, shadows: true });
+        }
+    }
+    Ok(imported)
 }

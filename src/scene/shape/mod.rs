@@ -194,7 +194,8 @@ impl Shape {
                 length("radius", radius)?;
                 length("height", height)?;
                 if height < 2.0 * radius {
-                    let message = format!("a capsule of radius {radius} is at least {} high", 2.0 * radius);
+                    let message =
+                        format!("a capsule of radius {radius} is at least {} high, found {height}", 2.0 * radius);
                     return Err(ShapeFault { parameter: "height", message });
                 }
                 at_least(&[(around, 3, "around"), (rings, 1, "from pole to rim")])

@@ -92,20 +92,7 @@ impl Resolver<'_> {
         }
         let name = written.name.clone().unwrap_or_else(|| "camera".to_owned());
         let camera = Camera::look_at(name, projection, position, target, up);
-        camera
-            .map_err(|fault| {
-                let at_itself = (position - target).try_normalize().is_none();
-                let blame: &[&str] = if at_itself { &["target", "position"] } else { &["up", "target", "position"] };
-                let place = blame.iter().find_map(|key| node.get(key)).unwrap_or(node);
-                let fault = fault.at(place.span.clone());
-                let defaults = [("target", "[0, 0, 0]"), ("up", "[0, 1, 0]")];
-                let mut unwritten = defaults.iter().filter(|(key, _)| blame.contains(key) && !node.mentions(key));
-                self.faults.push(match unwritten.next() {
-                    Some((key, value)) => fault.hint(format!("`{key}` is {value} if it is not given")),
-                    None => fault,
-                });
-            })
-            .ok()
+        camera.map_err(|fault| self.faults.push(explain_look_at(fault, position, target, up, node))).ok()
     }
 
     fn camera_from_node(&mut self, name: &str, written: &format::Camera, node: &Node) -> Option<Camera> {
@@ -129,6 +116,21 @@ impl Resolver<'_> {
             self.faults.push(fault.at(node.span_of("node")));
         }
         None
+    }
+}
+
+/// Says which of the keys is to blame, and what holds for one that is not written.
+fn explain_look_at(fault: Diagnostic, position: DVec3, target: DVec3, up: DVec3, node: &Node) -> Diagnostic {
+    let at_itself = (position - target).try_normalize().is_none();
+    let blame: &[&str] = if at_itself { &["target", "position"] } else { &["up", "target", "position"] };
+    let place = blame.iter().find_map(|key| node.get(key)).unwrap_or(node);
+    let fault = fault.at(place.span.clone());
+    if !at_itself && !node.mentions("up") {
+        fault.hint("`up` is [0, 1, 0] if it is not given")
+    } else if !node.mentions("target") && (at_itself || up != DVec3::ZERO) {
+        fault.hint("`target` is [0, 0, 0] if it is not given")
+    } else {
+        fault
     }
 }
 

@@ -4,7 +4,7 @@ use super::super::document::Node;
 use super::super::format;
 use super::{Resolver, rgb, vector};
 use crate::diag::Diagnostic;
-use crate::math::{DVec3, Vec3};
+use crate::math::Vec3;
 use crate::scene::light::{Light, LightKind};
 
 impl Resolver<'_> {
@@ -56,7 +56,8 @@ impl Resolver<'_> {
     }
 
     fn direction(&mut self, written: format::Vector, node: &Node) -> Option<Vec3> {
-        let direction = vector(written).try_normalize().map(DVec3::as_vec3);
+        // Normalized again in single precision, so that its length is 1 to the last bits there, too.
+        let direction = vector(written).try_normalize().map(|direction| direction.as_vec3().normalize());
         if direction.is_none() {
             let fault = Diagnostic::error("the direction of a light cannot be zero").at(node.span_of("direction"));
             self.faults.push(fault.hint("[0, -1, 0] shines straight down"));

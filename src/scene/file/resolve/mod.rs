@@ -52,6 +52,9 @@ pub(super) fn resolve(file: &SceneFile, node: &Node, context: Context<'_>, fault
         model_cameras: Vec::new(),
     };
     resolver.scene.camera_name.clone_from(&context.options.camera);
+    if context.options.frame.is_some_and(|frame| !frame.is_finite()) {
+        resolver.faults.push(Diagnostic::error("the frame must be a finite number"));
+    }
     resolver.scene.time = (context.options.frame.unwrap_or(0.0) / FRAME_RATE) as f32;
     resolver.render(&file.render);
     resolver.lines(&file.lines);
@@ -94,15 +97,15 @@ impl<'a> Resolver<'a> {
 
     /// What the scene lacks, and what looks like a slip.
     fn fill_in(&mut self) {
+        // Framing looks at all meshes; there is no use in it if the scene is not going to be.
+        if self.faults.has_errors() {
+            return;
+        }
         if self.scene.objects.is_empty() && !self.node.mentions("objects") {
             let warning = Diagnostic::warning("the scene has no objects: the picture shows the background only");
             let start = Span::new(self.context.source, 0..0);
             self.faults
                 .push(warning.at(start).hint("add one: [[objects]] with shape = \"sphere\" or gltf = \"model.glb\""));
-        }
-        // Framing looks at all meshes; there is no use in it if the scene is not going to be.
-        if self.faults.has_errors() {
-            return;
         }
         let bounds = framing::bounds(&self.scene);
         if self.scene.cameras.is_empty() {

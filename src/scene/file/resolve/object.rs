@@ -1,5 +1,6 @@
 //! Objects: shapes and models with a place in the world.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use super::super::document::Node;
@@ -7,7 +8,7 @@ use super::super::format::{self, Segments, Size};
 use super::material::about_file;
 use super::transform::world_from_object;
 use super::{ModelCamera, Resolver};
-use crate::diag::Diagnostic;
+use crate::diag::{Diagnostic, Diagnostics, Span};
 use crate::scene::Object;
 use crate::scene::gltf::{self, ModelTime, Placement};
 use crate::scene::ids::MeshId;
@@ -19,11 +20,10 @@ impl Resolver<'_> {
     /// Adds all objects; returns the lights of those models whose lights are to be used.
     pub(super) fn objects(&mut self, objects: &[format::Object], lights_by_default: bool) -> Vec<Light> {
         let mut lights = Vec::new();
-        let mut names: Vec<String> = Vec::new();
+        let mut names = Names::default();
         let nodes = self.node.get("objects").map_or(&[][..], Node::items);
         for (object, node) in objects.iter().zip(nodes) {
-            let name = self.object_name(object, node, &names);
-            names.push(name.clone());
+            let name = self.object_name(object, node, &mut names);
             match (&object.gltf, object.shape) {
                 (Some(model), None) if !node.mentions("shape") => {
                     let found = self.model(model, object, node, name);
@@ -48,9 +48,9 @@ impl Resolver<'_> {
     }
 
     /// The written name, or one made of what the object is.
-    fn object_name(&mut self, object: &format::Object, node: &Node, taken: &[String]) -> String {
+    fn object_name(&mut self, object: &format::Object, node: &Node, names: &mut Names) -> String {
         if let Some(name) = &object.name {
-            if taken.contains(name) {
+            if !names.taken.insert(name.clone()) {
                 let warning = Diagnostic::warning(format!("another object is named `{name}`, too"));
                 let hint = format!("`--set objects.{name}` means the first");
                 self.faults.push(warning.at(node.span_of("name")).hint(hint));
@@ -62,9 +62,7 @@ impl Resolver<'_> {
             (None, Some(shape)) => Some(built_in(shape).name().to_owned()),
             (None, None) => None,
         };
-        let kind = kind.unwrap_or_else(|| "object".to_owned());
-        let numbered = (2..).map(|number| format!("{kind} {number}"));
-        std::iter::once(kind.clone()).chain(numbered).find(|name| !taken.contains(name)).unwrap_or(kind)
+        names.numbered(&kind.unwrap_or_else(|| "object".to_owned()))
     }
 
     fn model(&mut self, written: &str, object: &format::Object, node: &Node, name: String) -> Vec<Light> {
@@ -95,16 +93,20 @@ impl Resolver<'_> {
         };
         match gltf::import(&path, self.context.files, time, &mut self.scene, &placement) {
             Ok(imported) => {
-                self.faults.extend(imported.warnings);
+                self.model_faults(imported.warnings, &span);
                 let cameras = imported.cameras.into_iter();
                 self.model_cameras.extend(cameras.map(|camera| ModelCamera { model: name.clone(), camera }));
                 imported.lights
             }
             Err(faults) => {
-                faults.0.into_iter().for_each(|fault| self.faults.push(about_file(fault, &span)));
+                self.model_faults(faults, &span);
                 Vec::new()
             }
         }
+    }
+
+    fn model_faults(&mut self, faults: Diagnostics, span: &Span) {
+        faults.0.into_iter().for_each(|fault| self.faults.push(about_file(fault, span)));
     }
 
     fn shape(&mut self, kind: format::Shape, object: &format::Object, node: &Node, name: String) {
@@ -143,8 +145,11 @@ impl Resolver<'_> {
             let fault = Diagnostic::error(format!("a {} has no `{key}`", shape.name())).at(node.key_span(key));
             self.faults.push(fault.hint(format!("it has: {listed}")));
         }
-        let mut fault =
-            |(key, message): (&str, String)| self.faults.push(Diagnostic::error(message).at(node.span_of(key)));
+        let mut fault = |(key, message): (&str, String)| {
+            // What is not written cannot be wrong: then it is the radius that does not fit it.
+            let key = if node.mentions(key) { key } else { "radius" };
+            self.faults.push(Diagnostic::error(message).at(node.span_of(key)));
+        };
         set_parameters(&mut shape, object).map_err(&mut fault).ok()?;
         if let Some((_, id)) = self.shapes.iter().find(|(known, _)| *known == shape) {
             return Some(*id);
@@ -153,6 +158,28 @@ impl Resolver<'_> {
         let id = self.scene.add_mesh(mesh);
         self.shapes.push((shape, id));
         Some(id)
+    }
+}
+
+/// The names of the objects so far.
+#[derive(Default)]
+struct Names {
+    taken: BTreeSet<String>,
+    /// How many objects of a kind have been numbered.
+    numbers: BTreeMap<String, u32>,
+}
+
+impl Names {
+    /// `kind`, `kind 2`, `kind 3`, …, whichever is free.
+    fn numbered(&mut self, kind: &str) -> String {
+        let number = self.numbers.entry(kind.to_owned()).or_insert(0);
+        loop {
+            *number += 1;
+            let name = if *number == 1 { kind.to_owned() } else { format!("{kind} {number}") };
+            if self.taken.insert(name.clone()) {
+                return name;
+            }
+        }
     }
 }
 
