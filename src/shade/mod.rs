@@ -10,6 +10,7 @@
 
 pub mod analysis;
 pub mod batch;
+pub mod builtin;
 pub mod host;
 pub mod interpret;
 pub mod library;
