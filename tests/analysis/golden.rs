@@ -1,6 +1,6 @@
 //! One test for each construct.
 
-use super::{analysis, assert_dump, body, rgb, texture_ref};
+use super::{analysis, assert_dump, body, rgb};
 use tusche::shade::Value;
 
 #[test]

@@ -38,6 +38,7 @@ fn every_setting_is_taken_over() {
             samples: 9,
             seed: 7,
             background: Background::Gradient { bottom: Vec3::splat(0.1), top: Vec3::new(0.5, 0.6, 0.7) },
+            ambient: Vec3::new(0.3, 0.2, 0.1),
             filter: FilterKind::Mitchell,
             filter_radius: 2.0,
             reflection_depth: 2,
