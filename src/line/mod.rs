@@ -1,11 +1,12 @@
-//! The line pass: which line each sample sees. Pure image work on [`SampleBuffer`](crate::sample::SampleBuffer)s (OG18 section 3, DESIGN section 3).
+//! The line pass: which line each sample sees. Pure image work on a [`SampleBuffer`](crate::sample::SampleBuffer)'s columns
+//! (OG18 section 3, DESIGN section 3).
 //!
-//! `brute` is the definition as plain loops and the oracle for `search`, which gives the same bits much sooner.
-//!
-
 //! A tile of samples is made ready once ([`TileBounds::new`]); then [`find_lines`] may be called for many tiles at once,
-//! each with a [`Window`] onto the tiles around it. The result is a function of the samples and the rules alone: tile size,
-//! threads and method change no bit.
+//! each with a [`Window`] onto the tiles around it. The result is a function of the samples and the rules alone: tile
+//! size, threads and method change no bit.
+//!
+//! `brute` is the definition as plain loops and the oracle for `search`, which gives the same bits much sooner. What
+//! decides is shared by both: `differ`, `pair`, [`Rules`].
 
 mod bounds;
 mod brute;

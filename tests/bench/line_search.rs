@@ -11,7 +11,7 @@ use std::hint::black_box;
 use std::time::Instant;
 
 use picture::{Tiles, layout, sampled};
-use tusche::line::{Method, Rules, TileBounds};
+use tusche::line::{LineTile, Method, Rules, TileBounds, find_lines};
 use tusche::sample::{Node, PixelRect};
 use tusche::scene::settings::LineSettings;
 
@@ -55,17 +55,19 @@ fn measure(width: f32, samples_per_pixel: u32) {
         }
     });
 
-    // Brute force takes a row of tiles, or less where it would take minutes; its time hardly depends on what it sees.
-    let count = if width * (samples_per_pixel as f32) > 300.0 { 2 } else { 16 };
-    let crop = PixelRect { x0: 0, y0: 192, x1: TILE * count, y1: 192 + TILE };
-    let brute_samples = crop.pixels() as f64 * f64::from(samples_per_pixel);
-    let first = (crop.y0 / TILE * (PICTURE.x1 / TILE)) as usize;
-    let mut brute_pairs = 0;
-    let brute = seconds(|| {
-        for index in first..first + count as usize {
-            brute_pairs += tiles.lines_of(index, Method::Brute).counts.pairs_tested;
-        }
-    });
+    // Brute force takes small crops along the diagonal: its time hardly depends on what it sees.
+    let side = if width * (samples_per_pixel as f32) > 500.0 { 4 } else { 16 };
+    let (mut brute, mut brute_pairs, mut brute_samples) = (0.0, 0, 0.0);
+    for step in 1..9 {
+        let [x0, y0] = [PICTURE.x1 * step / 9, PICTURE.y1 * step / 9];
+        let crop = sampled(PixelRect { x0, y0, x1: x0 + side, y1: y0 + side }, &layout, &node);
+        let bounds = TileBounds::new(&crop, &rules);
+        let target = LineTile { buffer: &crop, bounds: &bounds };
+        brute_samples += crop.samples() as f64;
+        brute += seconds(|| {
+            brute_pairs += find_lines(&tiles.window(), target, &rules, Method::Brute).counts.pairs_tested;
+        });
+    }
 
     let [preparing, search, brute] = [preparing / samples, search / samples, brute * 1e9 / brute_samples];
     println!(
