@@ -3,7 +3,8 @@
 //! A picture is cut into blocks of [`SIDE`] pixels. Blocks that tiles have filled only in part wait in memory; a full
 //! one is packed and appended to a *spool*, a nameless file, which remembers nothing but where each block lies. So
 //! memory holds the blocks along the border between what is done and what is not, whatever the size of the picture,
-//! and the final file can be written in one fixed order: its bytes do not depend on the order of the tiles.
+//! and the final file can be written in one fixed order: its bytes do not depend on the order of the tiles. The price
+//! is that for the moment of finishing, the disk holds the picture twice.
 
 use std::collections::BTreeMap;
 use std::io::{self, Read, Seek, SeekFrom, Write};

@@ -47,7 +47,7 @@ const KNOWN: &str = "known types are .png and .exr";
 
 enum Format {
     Exr(Box<ExrFormat>),
-    Png(PngFormat),
+    Png(Box<PngFormat>),
 }
 
 struct State {
@@ -161,7 +161,7 @@ impl Format {
         let extension = settings.path.extension().map(|extension| extension.to_string_lossy().to_lowercase());
         match extension.as_deref() {
             Some("exr") => ExrFormat::new(settings).map(|exr| Self::Exr(Box::new(exr))),
-            Some("png") => PngFormat::new(settings).map(Self::Png),
+            Some("png") => PngFormat::new(settings).map(|png| Self::Png(Box::new(png))),
             Some(other) => Err(Diagnostic::error(format!("cannot write pictures of type `.{other}`")).hint(KNOWN)),
             None => Err(Diagnostic::error("the name of the picture has no extension to tell its type").hint(KNOWN)),
         }

@@ -56,7 +56,7 @@ impl Samples {
                     Fired::FEATURE,
                 ];
                 // Some regions have no lines at all.
-                (hash(x / 8, y / 8, 0, 6) % 2 == 0 && hash(x, y, s, 7) % 3 == 0).then(|| SeenLine {
+                (hash(x / 8, y / 8, 0, 6).is_multiple_of(2) && hash(x, y, s, 7).is_multiple_of(3)).then(|| SeenLine {
                     alpha: 0.5 + 0.5 * unit(x, y, s, 8),
                     lined: [unit(x, y, s, 9), 0.0, 0.2],
                     ..line([0.3, unit(x, y, s, 10), 0.0], tests[hash(x, y, s, 11) as usize % tests.len()])
