@@ -232,7 +232,7 @@ impl Reader<'_> {
             }
             Mode::TriangleFan => (0..whole).map(|i| [corner(i + 1), corner(i + 2), corner(0)]).collect(),
             _ => {
-                if corners.len() % 3 != 0 {
+                if !corners.len().is_multiple_of(3) {
                     report.warning(&self.place, format!("{} corners do not make whole triangles", corners.len()));
                 }
                 corners.chunks_exact(3).map(|c| [c[0][0], c[1][0], c[2][0]]).collect()

@@ -50,6 +50,11 @@ impl Report {
         }
     }
 
+    /// The model's path.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
     pub fn has_errors(&self) -> bool {
         self.errors > 0
     }

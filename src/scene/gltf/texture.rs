@@ -113,7 +113,7 @@ impl Textures {
                 Ok(image) => images.push(Some(image)),
                 Err(Some(fault)) => {
                     images.push(None);
-                    report.push(fault.hint(format!("{} wants it", wanted.wanted_by)));
+                    report.push(fault.hint(format!("{} of {} wants it", wanted.wanted_by, report.path().display())));
                 }
                 Err(None) => images.push(None),
             }
