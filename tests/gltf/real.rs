@@ -37,17 +37,36 @@ fn table() {
         let seconds = start.elapsed().as_secs_f64();
         let triangles: usize = scene.meshes.iter().map(|m| m.triangles.len()).sum();
         let vertices: usize = scene.meshes.iter().map(|m| m.positions.len()).sum();
-        println!("== {name} {seconds:.3}s objects {} meshes {} materials {} textures {} triangles {triangles} vertices {vertices}", scene.objects.len(), scene.meshes.len(), scene.materials.len(), scene.textures.len());
+        println!(
+            "== {name} {seconds:.3}s objects {} meshes {} materials {} textures {} triangles {triangles} vertices {vertices}",
+            scene.objects.len(),
+            scene.meshes.len(),
+            scene.materials.len(),
+            scene.textures.len()
+        );
         println!("{:?}", framing::bounds(&scene));
         println!("{warnings}");
         for o in &scene.objects {
             println!("  {} {:?} {:?} det {}", o.name, o.mesh, o.materials, o.world_from_object.matrix3.determinant());
         }
         for m in &scene.meshes {
-            println!("  mesh {} n{} t{} uv{} c{} slots{}", m.name, m.normals.len(), m.tangents.len(), m.uvs.len(), m.colors.len(), m.slot_count());
+            println!(
+                "  mesh {} n{} t{} uv{} c{} slots{}",
+                m.name,
+                m.normals.len(),
+                m.tangents.len(),
+                m.uvs.len(),
+                m.colors.len(),
+                m.slot_count()
+            );
         }
         for m in &scene.materials {
-            println!("  mat {} ds{} {:?}", m.name, m.double_sided, m.params.iter().map(|(k, v)| (k, &v.0)).collect::<Vec<_>>());
+            println!(
+                "  mat {} ds{} {:?}",
+                m.name,
+                m.double_sided,
+                m.params.iter().map(|(k, v)| (k, &v.0)).collect::<Vec<_>>()
+            );
         }
         for c in &scene.cameras {
             println!("  {c:?}");
