@@ -1,5 +1,6 @@
 //! Triangles, attributes, and what is computed where a model has none.
 
+use proptest::prelude::*;
 use serde_json::{Value, json};
 use tusche::math::{Vec2, Vec3, Vec4};
 use tusche::scene::gltf::ModelTime;
@@ -375,4 +376,39 @@ fn positions_that_are_not_finite_cost_their_triangles() {
         "model.gltf: warning: meshes[0].primitives[0].attributes.POSITION: 1 triangles have positions that are not \
          finite numbers and are not drawn"
     );
+}
+
+proptest! {
+    /// Tangents of any triangles, however they meet and whatever their uv are, are a frame with the normals.
+    #[test]
+    fn tangents_of_any_mesh(
+        points in prop::collection::vec(prop::array::uniform3(-2_i8..3), 3..12),
+        spots in prop::collection::vec(prop::array::uniform2(-2_i8..3), 12),
+        corners in prop::collection::vec(any::<prop::sample::Index>(), 3..60),
+        with_normals in any::<bool>(),
+    ) {
+        let count = points.len();
+        let corners: Vec<u16> = corners.iter().map(|corner| corner.index(count) as u16).collect();
+        let corners = &corners[..corners.len() / 3 * 3];
+        let mut model = textured_square(&[0.; 8], false);
+        let floats = |values: &[i8]| values.iter().map(|value| f32::from(*value)).collect::<Vec<_>>();
+        let positions = model.floats("VEC3", &floats(points.as_flattened()));
+        let uvs = model.floats("VEC2", &floats(spots[..count].as_flattened()));
+        let indices = model.shorts("SCALAR", corners);
+        let mut attributes = json!({ "POSITION": positions, "TEXCOORD_0": uvs });
+        if with_normals {
+            let normals: Vec<_> = points.iter().map(|[x, y, z]| [*y, *z, *x]).collect();
+            attributes["NORMAL"] = json!(model.floats("VEC3", &floats(normals.as_flattened())));
+        }
+        edit(&mut model, "attributes", attributes);
+        edit(&mut model, "indices", json!(indices));
+        let (scene, _) = model.import();
+        for mesh in &scene.meshes {
+            prop_assert_eq!(mesh.tangents.len(), mesh.positions.len());
+            for (tangent, normal) in mesh.tangents.iter().zip(&mesh.normals) {
+                prop_assert!(normal.is_normalized() && tangent.truncate().is_normalized(), "{tangent} {normal}");
+                prop_assert!(tangent.w.abs() == 1.0);
+            }
+        }
+    }
 }

@@ -1,10 +1,12 @@
 //! What an exporter may add for Tusche: `extras.tusche` on materials and nodes.
 //!
 //! On a material: `{ "shader": "ink.rhai", "params": { "ink_width": 2.5 }, "priority": 3 }`. On a node, also
-//! `"lines": false`; a node's shader replaces all materials of its mesh. A shader is a path relative to the model, or
-//! `builtin:NAME`. Parameters are written as in a scene file: booleans, numbers, arrays of two to four numbers, texts,
-//! and textures as `{ "texture": "noise.png", "srgb": false, "wrap": "clamp", "filter": "nearest" }`. The record may
-//! also be a text that holds this JSON, which is all that some exporters can write.
+//! `"lines": false`; a node's shader replaces all materials of its mesh. What a node says does not reach its children.
+//!
+//! A shader is a path relative to the model, or `builtin:NAME`. Parameters are written as in a scene file: booleans,
+//! numbers, arrays of two to four numbers, texts, and textures as
+//! `{ "texture": "noise.png", "srgb": false, "wrap": "clamp", "filter": "nearest" }`. The record may also be a text that
+//! holds this JSON, which is all that some exporters can write.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

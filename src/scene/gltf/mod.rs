@@ -2,26 +2,28 @@
 //!
 //! A model is read in this order:
 //!
-//! 1. [`document`]: container, JSON and its checks, the bytes of the buffers.
-//! 2. [`node`], [`animation`]: the hierarchy, posed at one time, composed in double precision.
-//! 3. [`primitive`], [`pose`], [`build`], [`tangent`]: each mesh is read once, deformed for the nodes that have skins or
+//! 1. `document`: container, JSON and its checks, the bytes of the buffers.
+//! 2. `node`, `animation`: the hierarchy, posed at one time, composed in double precision.
+//! 3. `primitive`, `pose`, `build`, `tangent`: each mesh is read once, deformed for the nodes that have skins or
 //!    morph weights, and merged into one scene mesh whose triangles know their material slot.
-//! 4. [`material`], [`extras`], [`texture`]: the used materials, and the images they need, decoded in parallel.
-//! 5. [`model`] runs these steps; only if all went well, the parts enter the [`SceneBuilder`]: one object for each node
+//! 4. `material`, `extras`, `texture`: the used materials, and the images they need, decoded in parallel.
+//! 5. `model` runs these steps; only if all went well, the parts enter the [`SceneBuilder`]: one object for each node
 //!    with a mesh.
 //!
 //! A model is untrusted input. Lengths and indices are checked before they are used, nothing recurses along the file's
 //! structure, and every fault is told with its place in the JSON, all in one go.
 //!
 //! Out of scope: points and lines, mesh compression, texture formats other than PNG and JPEG, all animations but the
-//! first, material variants, and extensions of materials beyond those in [`document`].
+//! first, material variants, and extensions of materials beyond those in `document`.
 
 mod accessor;
 mod animation;
 mod build;
+mod camera;
 mod document;
 mod extras;
 mod instancing;
+mod light;
 mod material;
 mod model;
 mod node;
@@ -30,7 +32,6 @@ mod primitive;
 mod report;
 mod tangent;
 mod texture;
-mod view;
 
 use std::ops::Range;
 use std::path::Path;

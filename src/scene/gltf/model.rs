@@ -15,7 +15,7 @@ use super::pose::Deformation;
 use super::primitive::{self, Skipped};
 use super::report::Report;
 use super::texture::Textures;
-use super::{Imported, ModelTime, Placement, animation, instancing, node, view};
+use super::{Imported, ModelTime, Placement, animation, camera, instancing, light, node};
 use crate::diag::{Diagnostic, Diagnostics};
 use crate::files::FileStore;
 use crate::math::DAffine3;
@@ -86,6 +86,7 @@ pub(super) fn read(
         model_from_nodes: &model_from_nodes,
         report,
         names: Names::default(),
+        camera_names: Names::default(),
         shared: BTreeMap::new(),
         shapes: Vec::new(),
         parts: Vec::new(),
@@ -144,6 +145,7 @@ struct Walk<'a> {
     model_from_nodes: &'a [DAffine3],
     report: &'a mut Report,
     names: Names,
+    camera_names: Names,
     /// The shapes that nodes share, by glTF mesh.
     shared: BTreeMap<usize, usize>,
     shapes: Vec<Shape>,
@@ -164,10 +166,11 @@ impl Walk<'_> {
         if json.camera.is_some() {
             let own = || json.camera.and_then(|camera| root.cameras.get(camera.value())?.name.clone());
             let name = json.name.clone().or_else(own).unwrap_or_else(|| format!("camera {}", self.cameras.len()));
-            self.cameras.extend(view::camera(root, node, name, &world_from_node, self.report));
+            let name = self.camera_names.unique(name, &format!("node {node}"));
+            self.cameras.extend(camera::of_node(root, node, name, &world_from_node, self.report));
         }
         let name = json.name.clone().unwrap_or_else(|| format!("node {node}"));
-        self.lights.extend(view::light(root, node, name.clone(), &world_from_node, self.report));
+        self.lights.extend(light::of_node(root, node, name.clone(), &world_from_node, self.report));
         if let Some(mesh) = json.mesh {
             self.visit_mesh(node, mesh.value(), &name);
         }
