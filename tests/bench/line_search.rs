@@ -1,4 +1,4 @@
-//! How much sooner the search finds the oracle's lines: `cargo bench --bench line_search [WIDTH...]`.
+//! How much sooner the search finds the oracle's lines: `cargo bench --bench line_search -- [WIDTH...]`.
 //!
 //! The picture is synthetic (no ray tracer): discs and straight edges at several depths before a background that the
 //! camera misses, one disc with a priority, one domed so that creases are tested too. Most of it is far from any edge.
@@ -19,6 +19,10 @@ const PICTURE: PixelRect = PixelRect { x0: 0, y0: 0, x1: 512, y1: 384 };
 const TILE: i32 = 32;
 
 fn main() {
+    // `cargo test --all-targets` runs benchmarks too, without this flag.
+    if !std::env::args().any(|argument| argument == "--bench") {
+        return;
+    }
     let asked: Vec<f32> = std::env::args().filter_map(|argument| argument.parse().ok()).collect();
     let widths = if asked.is_empty() { vec![1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0] } else { asked };
     println!(

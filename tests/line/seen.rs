@@ -104,6 +104,18 @@ fn among_equal_ranks_the_nearest_is_seen_and_then_the_first() {
     assert_eq!(neighbors(&camera_lines(&nodes, &settings()))[1], Some(0), "an own line");
 }
 
+/// A tie on the borders of pixels, where the second neighbour is the search's first guess.
+#[test]
+fn a_tie_goes_to_the_first_whatever_was_tried_first() {
+    let behind = |object| [(CAMERA, hit(object, 5.0, 0.0))];
+    let front = |object| [(CAMERA, hit(object, 1.0, 9.0))];
+    let [a, b, c, d] = [behind(1), front(1), behind(2), front(3)];
+    let samples: [(f32, &[_]); 4] = [(0.5, &a), (1.0, &b), (0.5, &c), (0.0, &d)];
+    let lines = by_sample(&lines_of(&samples, &settings()), 4);
+    assert_eq!(neighbors(&lines)[0], Some(3));
+    assert_eq!(neighbors(&lines)[2], Some(1));
+}
+
 #[test]
 fn a_miss_never_styles() {
     let low = Node { priority: i32::MIN, ..hit(1, f32::MAX, 3.0) };
