@@ -188,7 +188,7 @@ fn scalar(name: &str, arguments: &[Interval]) -> Option<Interval> {
     Some(match (name, arguments) {
         ("abs", [x]) => x.abs(),
         ("sign", [x]) => {
-            let sign = |x: f32| if x == 0.0 { 0.0 } else { x.signum() };
+            let sign = |x: f32| if x == 0.0 { x } else { x.signum() };
             x.rising(sign)
         }
         ("floor", [x]) => x.rising(f32::floor),
@@ -199,7 +199,7 @@ fn scalar(name: &str, arguments: &[Interval]) -> Option<Interval> {
         ("sqrt", [x]) => x.sqrt(),
         ("exp" | "exp2", [x]) => {
             let bounds = x.rising_roughly(if name == "exp" { f64::exp } else { f64::exp2 });
-            Interval { low: bounds.low.max(0.0), ..bounds }
+            Interval::new(bounds.low.max(0.0), bounds.high).or_nan(bounds.nan)
         }
         ("ln" | "log" | "log2", [x]) if x.low >= 0.0 => x.rising_roughly(match name {
             "log2" => f64::log2,
@@ -232,7 +232,7 @@ fn scalar(name: &str, arguments: &[Interval]) -> Option<Interval> {
 
 /// `x - y * floor(x / y)`: from 0 to `y`, but for rounding.
 fn modulo(x: Interval, y: Interval) -> Interval {
-    if !x.div(y).is_finite() {
+    if !x.div(y).is_finite() || !x.is_finite() || !y.is_finite() {
         return Interval::ANY;
     }
     let between = Interval::exact(0.0).hull(y);

@@ -78,7 +78,7 @@ fn dot(a: &Vector, b: &Vector) -> Interval {
     let products = a.channels.iter().zip(&b.channels).map(|(a, b)| a.mul(*b));
     let sum = products.reduce(Interval::add).unwrap_or(Interval::ANY);
     let limit = slightly_more(slightly_more(a.length) * b.length) + f32::MIN_POSITIVE;
-    if sum.is_finite() && limit.is_finite() { sum.meet(Interval::within(limit)) } else { sum }
+    if sum.is_finite() && limit.is_finite() && sum.value().is_none() { sum.meet(Interval::within(limit)) } else { sum }
 }
 
 fn cross(a: &Vector, b: &Vector) -> Vector {

@@ -2,11 +2,13 @@
 //!
 //! An [`Interval`] bounds what an `f32` of a running script can be. Bounds are sound under rounding: IEEE operations
 //! are monotone, so the bounds of a sum or a product are computed with the very same `f32` operations; whatever is not
-//! correctly rounded, or whose formula is not fixed, is widened outwards. NaN is tracked apart, as a flag. The two zeros
-//! count as equal: nothing that could tell them apart (a division) is given bounds.
+//! correctly rounded is widened outwards. NaN is tracked apart, as a flag.
+//!
+//! −0 lies below +0: a zero whose sign is not known is no known value, for a division by it can tell the two apart. So
+//! bounds that come out as a zero are taken as both zeros, unless all operands are known to the bit.
 
 /// What a float can be: within `low` … `high`, or NaN if `nan`.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Interval {
     /// Least value, never NaN.
     pub low: f32,
@@ -16,6 +18,13 @@ pub(crate) struct Interval {
     pub nan: bool,
 }
 
+impl PartialEq for Interval {
+    fn eq(&self, other: &Self) -> bool {
+        let bits = |x: &Self| (x.low.to_bits(), x.high.to_bits(), x.nan);
+        bits(self) == bits(other)
+    }
+}
+
 /// Relative error that no reasonable order of a few `f32` operations exceeds.
 const SLACK: f64 = 1e-6;
 
@@ -23,18 +32,20 @@ impl Interval {
     /// Anything, NaN included.
     pub const ANY: Self = Self { low: f32::NEG_INFINITY, high: f32::INFINITY, nan: true };
     /// 0 … 1.
-    pub const UNIT: Self = Self { low: 0.0, high: 1.0, nan: false };
+    pub const UNIT: Self = Self::new(0.0, 1.0);
     /// A component of a unit vector, with room for the rounding of its normalization.
-    pub const UNIT_COMPONENT: Self = Self { low: -1.000_001, high: 1.000_001, nan: false };
+    pub const UNIT_COMPONENT: Self = Self::within(1.000_001);
 
-    /// Between two numbers.
+    /// Between two numbers, with zeros of either sign.
     pub const fn new(low: f32, high: f32) -> Self {
+        let low = if low == 0.0 { -0.0 } else { low };
+        let high = if high == 0.0 { 0.0 } else { high };
         Self { low, high, nan: false }
     }
 
-    /// Exactly one number.
+    /// Exactly one number, to the bit.
     pub const fn exact(x: f32) -> Self {
-        if x.is_nan() { Self::ANY } else { Self::new(x, x) }
+        if x.is_nan() { Self::ANY } else { Self { low: x, high: x, nan: false } }
     }
 
     /// From −`size` to `size`.
@@ -42,9 +53,23 @@ impl Interval {
         Self::new(-size, size)
     }
 
+    /// Between two results of which NaN means that nothing is known, and then is possible.
+    fn between(low: f32, high: f32) -> Self {
+        let bounds = Self::new(
+            if low.is_nan() { f32::NEG_INFINITY } else { low },
+            if high.is_nan() { f32::INFINITY } else { high },
+        );
+        bounds.or_nan(low.is_nan() || high.is_nan())
+    }
+
     /// The value, if only one is possible.
     pub fn value(self) -> Option<f32> {
-        (self.low == self.high && !self.nan).then_some(self.low)
+        (self.low.to_bits() == self.high.to_bits() && !self.nan).then_some(self.low)
+    }
+
+    /// The result of an operation on values that are both known.
+    fn known(self, other: Self, f: impl Fn(f32, f32) -> f32) -> Option<Self> {
+        Some(Self::exact(f(self.value()?, other.value()?)))
     }
 
     /// Whether zero is possible.
@@ -68,14 +93,16 @@ impl Interval {
 
     /// All that either can be.
     pub fn hull(self, other: Self) -> Self {
-        Self { low: self.low.min(other.low), high: self.high.max(other.high), nan: self.nan || other.nan }
+        let low = if other.low.total_cmp(&self.low).is_lt() { other.low } else { self.low };
+        let high = if other.high.total_cmp(&self.high).is_gt() { other.high } else { self.high };
+        Self { low, high, nan: self.nan || other.nan }
     }
 
     /// What both bounds allow: for two sound bounds of one value.
     pub fn meet(self, other: Self) -> Self {
         let (low, high) = (self.low.max(other.low), self.high.min(other.high));
         // Disjoint bounds mean that no number is possible; any of the two is then sound.
-        if low <= high { Self { low, high, nan: self.nan && other.nan } } else { self }
+        if low <= high { Self::new(low, high).or_nan(self.nan && other.nan) } else { self }
     }
 
     /// Bounds moved outwards by the rounding errors of a few operations on values of that size.
@@ -89,7 +116,7 @@ impl Interval {
         let slack = f64::from(size) * SLACK;
         let low = (f64::from(self.low) - slack) as f32;
         let high = (f64::from(self.high) + slack) as f32;
-        Self { low: low.next_down(), high: high.next_up(), nan: self.nan }
+        Self::new(low.next_down(), high.next_up()).or_nan(self.nan)
     }
 
     /// The greatest magnitude.
@@ -99,11 +126,9 @@ impl Interval {
 
     /// A function that never falls and is computed by the very `f32` operations of `f`.
     pub fn rising(self, f: impl Fn(f32) -> f32) -> Self {
-        let (low, high) = (f(self.low), f(self.high));
-        Self {
-            low: if low.is_nan() { f32::NEG_INFINITY } else { low },
-            high: if high.is_nan() { f32::INFINITY } else { high },
-            nan: self.nan || low.is_nan() || high.is_nan(),
+        match self.value() {
+            Some(x) => Self::exact(f(x)),
+            None => Self::between(f(self.low), f(self.high)).or_nan(self.nan),
         }
     }
 
@@ -118,12 +143,10 @@ impl Interval {
 
     pub fn add(self, other: Self) -> Self {
         let opposite = |a: Self, b: Self| a.high == f32::INFINITY && b.low == f32::NEG_INFINITY;
-        let (low, high) = (self.low + other.low, self.high + other.high);
-        Self {
-            low: if low.is_nan() { f32::NEG_INFINITY } else { low },
-            high: if high.is_nan() { f32::INFINITY } else { high },
-            nan: self.nan || other.nan || opposite(self, other) || opposite(other, self),
-        }
+        self.known(other, |a, b| a + b).unwrap_or_else(|| {
+            let nan = self.nan || other.nan || opposite(self, other) || opposite(other, self);
+            Self::between(self.low + other.low, self.high + other.high).or_nan(nan)
+        })
     }
 
     pub fn sub(self, other: Self) -> Self {
@@ -132,28 +155,30 @@ impl Interval {
 
     pub fn mul(self, other: Self) -> Self {
         let zero_times_infinity = |a: Self, b: Self| a.has_zero() && b.has_infinity();
-        self.corners(other, |a, b| a * b).or_nan(zero_times_infinity(self, other) || zero_times_infinity(other, self))
+        self.known(other, |a, b| a * b).unwrap_or_else(|| {
+            let nan = zero_times_infinity(self, other) || zero_times_infinity(other, self);
+            self.corners(other, |a, b| a * b).or_nan(nan)
+        })
     }
 
     /// Without bounds if the divisor can be zero.
     pub fn div(self, other: Self) -> Self {
         if other.has_zero() {
-            return Self::ANY;
+            return self.known(other, |a, b| a / b).unwrap_or(Self::ANY);
         }
-        self.corners(other, |a, b| a / b).or_nan(self.has_infinity() && other.has_infinity())
+        self.known(other, |a, b| a / b)
+            .unwrap_or_else(|| self.corners(other, |a, b| a / b).or_nan(self.has_infinity() && other.has_infinity()))
     }
 
     /// The remainder with the sign of the dividend, as `%`.
     pub fn rem(self, other: Self) -> Self {
-        if let (Some(a), Some(b)) = (self.value(), other.value()) {
-            return Self::exact(a % b);
-        }
-        let size = self.size().min(other.size());
-        Self {
-            low: if self.low < 0.0 { -size } else { 0.0 },
-            high: if self.high > 0.0 { size } else { 0.0 },
-            nan: self.nan || other.nan || other.has_zero() || self.has_infinity(),
-        }
+        self.known(other, |a, b| a % b).unwrap_or_else(|| {
+            let size = self.size().min(other.size());
+            let low = if self.low < 0.0 { -size } else { 0.0 };
+            let high = if self.high > 0.0 { size } else { 0.0 };
+            let nan = self.nan || other.nan || other.has_zero() || self.has_infinity();
+            Self::new(low, high).or_nan(nan)
+        })
     }
 
     /// The hull of an operation that is monotone in each operand. What is not a number at a corner (0 · ∞) is next to
@@ -161,7 +186,7 @@ impl Interval {
     fn corners(self, other: Self, f: impl Fn(f32, f32) -> f32) -> Self {
         let at = |a, b| {
             let x = f(a, b);
-            Self::new(0.0, 0.0).hull_if(x.is_nan(), x)
+            if x.is_nan() { Self::new(0.0, 0.0) } else { Self::new(x, x) }
         };
         at(self.low, other.low)
             .hull(at(self.low, other.high))
@@ -170,12 +195,10 @@ impl Interval {
             .or_nan(self.nan || other.nan)
     }
 
-    fn hull_if(self, nan: bool, x: f32) -> Self {
-        if nan { self } else { Self::new(x, x) }
-    }
-
     pub fn abs(self) -> Self {
-        if self.low >= 0.0 {
+        if let Some(x) = self.value() {
+            Self::exact(x.abs())
+        } else if self.low >= 0.0 {
             self
         } else if self.high <= 0.0 {
             self.neg()
@@ -184,42 +207,44 @@ impl Interval {
         }
     }
 
-    /// The lesser of two. Libraries differ in which operand wins over NaN, so both results are allowed for.
+    /// The lesser of two. Which operand is seen beside a NaN differs between functions, so both are allowed for.
     pub fn min(self, other: Self) -> Self {
-        let least = Self::new(self.low.min(other.low), self.high.min(other.high));
-        Self::beside_nan(least, self, other)
+        let least = |a: f32, b: f32| if b < a { b } else { a };
+        self.known(other, least)
+            .unwrap_or_else(|| Self::new(self.low.min(other.low), self.high.min(other.high)).beside_nan(self, other))
     }
 
     /// The greater of two; see [`Self::min`].
     pub fn max(self, other: Self) -> Self {
-        let greatest = Self::new(self.low.max(other.low), self.high.max(other.high));
-        Self::beside_nan(greatest, self, other)
+        let greatest = |a: f32, b: f32| if a < b { b } else { a };
+        self.known(other, greatest)
+            .unwrap_or_else(|| Self::new(self.low.max(other.low), self.high.max(other.high)).beside_nan(self, other))
     }
 
-    fn beside_nan(result: Self, a: Self, b: Self) -> Self {
-        let result = if a.nan { result.hull(Self { nan: true, ..b }) } else { result };
-        if b.nan { result.hull(Self { nan: true, ..a }) } else { result }
+    fn beside_nan(self, a: Self, b: Self) -> Self {
+        let result = if a.nan { self.hull(b) } else { self };
+        if b.nan { result.hull(a).or_nan(true) } else { result.or_nan(a.nan) }
     }
 
-    /// `x` moved into `low` … `high`.
+    /// `min(max(self, low), high)`.
     pub fn clamp(self, low: Self, high: Self) -> Self {
-        if low.high > high.low || low.nan || high.nan {
-            return self.hull(low).hull(high);
-        }
-        let move_in = |x: f32, low: f32, high: f32| x.max(low).min(high);
-        let moved = Self::new(move_in(self.low, low.low, high.low), move_in(self.high, low.high, high.high));
-        if self.nan { moved.hull(Self { nan: true, ..low.hull(high) }) } else { moved }
+        self.max(low).min(high)
     }
 
     pub fn sqrt(self) -> Self {
-        let nan = self.nan || self.low < 0.0;
-        Self::new(self.low.max(0.0).sqrt(), self.high.max(0.0).sqrt()).or_nan(nan)
+        match self.value() {
+            Some(x) => Self::exact(x.sqrt()),
+            None => {
+                let nan = self.nan || self.low < 0.0;
+                Self::new(self.low.max(0.0).sqrt(), self.high.max(0.0).sqrt()).or_nan(nan)
+            }
+        }
     }
 
     /// `self` to the power `exponent`. Negative bases have bounds only for whole constant exponents.
     pub fn pow(self, exponent: Self) -> Self {
         if self.low < 0.0 {
-            let Some(n) = exponent.value().filter(|n| n.fract() == 0.0 && *n >= 1.0 && n.abs() < 1e6) else {
+            let Some(n) = exponent.value().filter(|n| n.fract() == 0.0 && *n >= 1.0 && *n < 1e6) else {
                 return Self::ANY;
             };
             if n % 2.0 == 0.0 {
@@ -228,7 +253,7 @@ impl Interval {
             return self.rising_roughly(|x| x.powf(f64::from(n)));
         }
         // x^y is monotone in x, and monotone in y for each x, so the corners bound it.
-        let at = |x: f32, y: f32| f64::from(x).powf(f64::from(y));
+        let at = |x: f32, y: f32| f64::from(x.abs()).powf(f64::from(y));
         let corners = [
             at(self.low, exponent.low),
             at(self.low, exponent.high),
@@ -237,17 +262,21 @@ impl Interval {
         ];
         let low = corners.iter().copied().fold(f64::INFINITY, f64::min);
         let high = corners.iter().copied().fold(0.0, f64::max);
-        let bounds = outwards(low, high);
-        Self { low: bounds.low.max(0.0), high: bounds.high, nan: self.nan || exponent.nan }
+        // A negative zero has negative odd powers.
+        let low_bound = if self.low == 0.0 && exponent.low < 0.0 { f64::NEG_INFINITY } else { low };
+        let bounds = outwards(low_bound, high);
+        let low = if low_bound < 0.0 { bounds.low } else { bounds.low.max(0.0) };
+        Self::new(low, bounds.high).or_nan(self.nan || exponent.nan)
     }
 
     /// `self * (1 - t) + other * t`.
     pub fn mix(self, other: Self, t: Self) -> Self {
         let weighted = self.mul(Self::exact(1.0).sub(t)).add(other.mul(t));
-        if t.low >= 0.0 && t.high <= 1.0 && self.is_finite() && other.is_finite() && weighted.is_finite() {
+        let is_mean = t.low >= 0.0 && t.high <= 1.0 && self.is_finite() && other.is_finite() && !t.nan;
+        if is_mean && weighted.value().is_none() {
             // A mean lies between its terms, up to rounding.
             let between = self.hull(other);
-            return between.widened(between.size()).meet(Self { nan: t.nan, ..weighted }).or_nan(t.nan);
+            return between.widened(between.size()).meet(weighted);
         }
         weighted
     }
@@ -255,12 +284,7 @@ impl Interval {
 
 /// The interval from `low` to `high`, a little widened; NaN bounds are no bounds.
 fn outwards(low: f64, high: f64) -> Interval {
-    let nan = low.is_nan() || high.is_nan();
     let low = if low.is_infinite() { low } else { low - low.abs() * SLACK };
     let high = if high.is_infinite() { high } else { high + high.abs() * SLACK };
-    Interval {
-        low: if low.is_nan() { f32::NEG_INFINITY } else { (low as f32).next_down() },
-        high: if high.is_nan() { f32::INFINITY } else { (high as f32).next_up() },
-        nan,
-    }
+    Interval::between((low as f32).next_down(), (high as f32).next_up())
 }

@@ -194,7 +194,8 @@ fn fact(field: &Field, walker: &mut Walker) -> OutputFact {
         may: true,
         always: field.always,
         inputs: walker.escape(&field.value) | field.presence,
-        range: shape.range().filter(|range| !range.nan).map(|range| [range.low, range.high]),
+        // Adding 0 leaves no −0, which nobody would understand.
+        range: shape.range().filter(|range| !range.nan).map(|range| [range.low + 0.0, range.high + 0.0]),
         constant: shape.to_value(),
     }
 }

@@ -162,6 +162,7 @@ impl Shape {
     /// The bounds as an `f32`, of anything that is a number.
     pub fn number(&self) -> Option<Interval> {
         match self {
+            Self::Int(low, high) if low == high => Some(Interval::exact(*low as f32)),
             Self::Int(low, high) => Some(Interval::new(*low as f32, *high as f32)),
             Self::Float(x) | Self::Number(x) => Some(*x),
             _ => None,
@@ -314,8 +315,8 @@ impl Join<'_> {
             return hull;
         }
         Interval {
-            low: if hull.low < a.low { f32::NEG_INFINITY } else { a.low },
-            high: if hull.high > a.high { f32::INFINITY } else { a.high },
+            low: if hull.low < a.low { f32::NEG_INFINITY } else { hull.low },
+            high: if hull.high > a.high { f32::INFINITY } else { hull.high },
             nan: hull.nan,
         }
     }

@@ -1,6 +1,7 @@
 //! Whatever the analysis claims of a script must hold when the script runs: scripts are generated, analysed, and run
 //! by the interpreter with the real library on inputs that try the bounds.
 
+mod bounds;
 mod writer;
 
 use std::cell::Cell;
@@ -252,7 +253,7 @@ fn facts_hold_on_generated_scripts() {
     let bench = Bench::new();
     let config = ProptestConfig { cases: 1500, failure_persistence: None, ..ProptestConfig::default() };
     let (followed, ran) = (Cell::new(0), Cell::new(0));
-    let choices = prop::collection::vec(any::<u8>(), 0..300);
+    let choices = prop::collection::vec(any::<u8>(), 100..900);
     let cases = (choices, prop::collection::vec(hit(), 4));
     let result = TestRunner::new(config).run(&cases, |(choices, hits)| {
         if let Some(runs) = check(&bench, &writer::script(&choices), &hits).map_err(TestCaseError::fail)? {

@@ -44,17 +44,22 @@ impl Writer<'_> {
         (!names.is_empty()).then(|| names[usize::from(choice) % names.len()].clone())
     }
 
+    fn fallback(&self, input: &str, literal: &str) -> String {
+        if self.has_hit { input.into() } else { literal.into() }
+    }
+
     fn script(&mut self) -> String {
         let mut script = String::new();
-        for _ in 0..self.choose(4) {
+        for _ in 0..self.choose(3) {
             script += &self.function();
         }
         self.has_hit = true;
         self.returns = Type::Outputs;
         self.variables = vec![("out".into(), Type::Outputs)];
+        let declared = [self.declare(Type::Float), self.declare(Type::Vector)].concat();
         let count = 1 + self.choose(6);
-        let body = self.statements(count, 3);
-        let end = self.outputs(2);
+        let body = [declared, self.statements(count, 3)].concat();
+        let end = [self.write_output(), self.write_output(), self.outputs(2)].concat();
         script += "fn facing(hit) { max(0.0, dot(hit.normal, hit.light(0).direction)) }\n";
         format!("{script}fn surface(hit, p) {{ let out = #{{}}; {body} {end} }}")
     }
@@ -69,7 +74,8 @@ impl Writer<'_> {
         self.variables = parameters.iter().enumerate().map(|(i, t)| (format!("a{i}"), *t)).collect();
         let count = self.choose(3);
         let body = self.statements(count, 2);
-        let end = self.expression(result, 2);
+        let change = if is_method { format!("this = {};", self.expression(Type::Float, 1)) } else { String::new() };
+        let end = change + &*self.expression(result, 2);
         self.this = None;
         let names: Vec<String> = (0..parameters.len()).map(|i| format!("a{i}")).collect();
         let prefix = if is_method { "m" } else { "" };
@@ -106,10 +112,7 @@ impl Writer<'_> {
             0..=3 => self.simple_statement(),
             4 | 5 => {
                 let of = self.simple_type();
-                let value = self.expression(of, 2);
-                let name = self.name("v");
-                self.variables.push((name.clone(), of));
-                format!("let {name} = {value};")
+                self.declare(of)
             }
             6 | 7 => {
                 let (condition, first) = (self.expression(Type::Bool, 2), self.block(depth - 1));
@@ -181,12 +184,21 @@ impl Writer<'_> {
         body
     }
 
+    fn declare(&mut self, of: Type) -> String {
+        let value = self.expression(of, 2);
+        let name = self.name("v");
+        self.variables.push((name.clone(), of));
+        format!("let {name} = {value};")
+    }
+
+    fn write_output(&mut self) -> String {
+        let key = FLOAT_OUTPUTS[usize::from(self.choose(5))];
+        format!("out.{key} = {};", self.expression(Type::Float, 2))
+    }
+
     fn simple_statement(&mut self) -> String {
         match self.choose(9) {
-            0 | 1 if self.returns == Type::Outputs => {
-                let key = FLOAT_OUTPUTS[usize::from(self.choose(5))];
-                format!("out.{key} = {};", self.expression(Type::Float, 2))
-            }
+            0 | 1 if self.returns == Type::Outputs => self.write_output(),
             2 if self.returns == Type::Outputs => format!("out.base_color = {};", self.expression(Type::Vector, 2)),
             3 if self.in_loop.is_some() => format!("if {} {{ break; }}", self.expression(Type::Bool, 1)),
             4 if self.in_loop == Some(true) => format!("if {} {{ continue; }}", self.expression(Type::Bool, 1)),
@@ -229,7 +241,7 @@ impl Writer<'_> {
     }
 
     fn expression(&mut self, of: Type, depth: u8) -> String {
-        if depth > 0 && self.choose(12) == 11 {
+        if depth > 0 && self.choose(16) == 15 {
             let (condition, first, second) =
                 (self.expression(Type::Bool, 1), self.expression(of, depth - 1), self.expression(of, depth - 1));
             return format!("(if {condition} {{ {first} }} else {{ {second} }})");
@@ -271,7 +283,7 @@ impl Writer<'_> {
                     ["hit.distance", "hit.curvature", "hit.time", "p.half"][usize::from(self.choose(4))].into()
                 }
                 2 if self.this.is_some() => "this".into(),
-                _ => self.variable(Type::Float).unwrap_or_else(|| "0.75".into()),
+                _ => self.variable(Type::Float).unwrap_or_else(|| self.fallback("hit.curvature", "0.75")),
             };
         }
         let d = depth - 1;
@@ -332,7 +344,7 @@ impl Writer<'_> {
             return match self.choose(3) {
                 0 => ["1", "0", "2", "3", "-4", "5"][usize::from(self.choose(6))].into(),
                 1 if self.has_hit => ["hit.object_id", "hit.polygon_id", "p.three"][usize::from(self.choose(3))].into(),
-                _ => self.variable(Type::Int).unwrap_or_else(|| "2".into()),
+                _ => self.variable(Type::Int).unwrap_or_else(|| self.fallback("hit.polygon_id", "2")),
             };
         }
         let operator = ["+", "-", "*", "%", "/"][usize::from(self.choose(5))];
@@ -345,7 +357,7 @@ impl Writer<'_> {
                 0 if self.has_hit => "hit.front_facing".into(),
                 1 if self.has_hit => "hit.path_kind == \"camera\"".into(),
                 2 if self.has_hit => ["p.none != ()", "p.on", "p.map != ()"][usize::from(self.choose(3))].into(),
-                _ => self.variable(Type::Bool).unwrap_or_else(|| "true".into()),
+                _ => self.variable(Type::Bool).unwrap_or_else(|| self.fallback("hit.front_facing", "true")),
             };
         }
         let d = depth - 1;
@@ -370,7 +382,9 @@ impl Writer<'_> {
                 0 if self.has_hit => ["hit.normal", "hit.position", "hit.irradiance", "vec3(hit.uv, 0.5)"]
                     [usize::from(self.choose(4))]
                 .into(),
-                _ => self.variable(Type::Vector).unwrap_or_else(|| "vec3(0.25, 0.5, 1.0)".into()),
+                _ => self
+                    .variable(Type::Vector)
+                    .unwrap_or_else(|| self.fallback("hit.position", "vec3(0.25, -0.5, 1.0)")),
             };
         }
         let d = depth - 1;

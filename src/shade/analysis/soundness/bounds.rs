@@ -1,0 +1,182 @@
+//! Each operator and each function of numbers, on bounds that try it: what the interpreter computes must lie within.
+
+use proptest::prelude::*;
+use proptest::test_runner::TestRunner;
+use rhai::{AST, Dynamic, Engine, Scope};
+
+use super::number;
+use crate::shade::analysis::functions::library;
+use crate::shade::analysis::interval::Interval;
+use crate::shade::analysis::operators;
+use crate::shade::analysis::value::Shape;
+use crate::shade::host::Host;
+
+/// Operators and functions with their numbers of operands.
+const OPERATIONS: [(&str, usize); 54] = [
+    ("+", 2),
+    ("-", 2),
+    ("*", 2),
+    ("/", 2),
+    ("%", 2),
+    ("**", 2),
+    ("<", 2),
+    ("<=", 2),
+    (">", 2),
+    (">=", 2),
+    ("==", 2),
+    ("!=", 2),
+    ("-", 1),
+    ("abs", 1),
+    ("sign", 1),
+    ("floor", 1),
+    ("ceil", 1),
+    ("round", 1),
+    ("fract", 1),
+    ("saturate", 1),
+    ("sqrt", 1),
+    ("exp", 1),
+    ("exp2", 1),
+    ("ln", 1),
+    ("log", 1),
+    ("log2", 1),
+    ("sin", 1),
+    ("cos", 1),
+    ("tan", 1),
+    ("asin", 1),
+    ("acos", 1),
+    ("atan", 1),
+    ("sinh", 1),
+    ("cosh", 1),
+    ("tanh", 1),
+    ("radians", 1),
+    ("degrees", 1),
+    ("to_int", 1),
+    ("to_float", 1),
+    ("is_nan", 1),
+    ("hash", 1),
+    ("min", 2),
+    ("max", 2),
+    ("mod", 2),
+    ("pow", 2),
+    ("step", 2),
+    ("log", 2),
+    ("atan", 2),
+    ("clamp", 3),
+    ("mix", 3),
+    ("smoothstep", 3),
+    ("gray", 1),
+    ("hsv", 3),
+    ("remap", 5),
+];
+
+/// What is known of an operand, and one thing that it can be.
+#[derive(Clone, Debug)]
+struct Operand {
+    shape: Shape,
+    value: Dynamic,
+}
+
+fn float_operand() -> impl Strategy<Value = Operand> {
+    let small = prop::sample::select(vec![0.0, -0.0, 1.0, -1.0, 0.5, 2.0, 3.0, 0.1, 255.0]);
+    let end = prop_oneof![2 => number(1e30), 2 => small];
+    let ends = (end.clone(), end.clone(), end);
+    (ends, prop::sample::select(vec![0, 0, 1, 2, 3, 4]), any::<u8>()).prop_map(|((a, b, c), kind, pick)| {
+        let (mut low, mut high, mut inside) = (a.min(b), a.max(b), c.clamp(a.min(b), a.max(b)));
+        let mut nan = false;
+        match kind {
+            1 => high = f32::INFINITY,
+            2 => nan = true,
+            // Exactly known.
+            3 => (low, high, inside) = (c, c, c),
+            _ => {}
+        }
+        if kind == 3 {
+            return Operand { shape: Shape::Float(Interval::exact(c)), value: Dynamic::from_float(c) };
+        }
+        let value = match pick % 4 {
+            0 => low,
+            1 => high,
+            2 if nan => f32::NAN,
+            _ => inside,
+        };
+        low = low.min(high);
+        Operand { shape: Shape::Float(Interval::new(low, high).or_nan(nan)), value: Dynamic::from_float(value) }
+    })
+}
+
+fn int_operand() -> impl Strategy<Value = Operand> {
+    let end = prop_oneof![
+        -5..6_i64,
+        prop::sample::select(vec![0, 1, 16_777_217, -16_777_219, i64::MAX, i64::MIN, 4_294_967_295])
+    ];
+    (end.clone(), end.clone(), end).prop_map(|(a, b, c)| {
+        let (low, high) = (a.min(b), a.max(b));
+        Operand { shape: Shape::Int(low, high), value: Dynamic::from_int(c.clamp(low, high)) }
+    })
+}
+
+/// The expression of an operation on variables.
+fn expression(name: &str, count: usize) -> String {
+    match (name.starts_with(char::is_alphabetic), count) {
+        (true, _) => format!("{name}({})", ["a", "b", "c", "d", "e"][..count].join(", ")),
+        (false, 1) => format!("{name}a"),
+        (false, _) => format!("a {name} b"),
+    }
+}
+
+fn check(engine: &Engine, name: &str, ast: &AST, operands: &[Operand]) -> Result<(), String> {
+    let shapes: Vec<&Shape> = operands.iter().map(|operand| &operand.shape).collect();
+    let claimed = match shapes.as_slice() {
+        [a, b] if operators::is_binary(name) => operators::binary(name, a, b),
+        [x] => operators::unary(name, x).or_else(|| library(name, &shapes)),
+        _ => library(name, &shapes),
+    };
+    let mut scope = Scope::new();
+    for (name, operand) in ["a", "b", "c", "d", "e"].iter().zip(operands) {
+        scope.push_dynamic(*name, operand.value.clone());
+    }
+    let (Some(claimed), Ok(result)) = (claimed, engine.eval_ast_with_scope::<Dynamic>(&mut scope, ast)) else {
+        return Ok(());
+    };
+    let within = match &claimed {
+        Shape::Bool(known) => known.is_none_or(|known| result.as_bool() == Ok(known)),
+        Shape::Int(low, high) => result.as_int().is_ok_and(|n| (low..=high).contains(&&n)),
+        Shape::Float(bounds) => result.as_float().is_ok_and(|x| is_within(*bounds, x)),
+        Shape::Number(bounds) => {
+            let x = result.as_float().or_else(|_| result.as_int().map(|n| n as f32));
+            x.is_ok_and(|x| is_within(*bounds, x))
+        }
+        Shape::Vector(vector) => result
+            .read_lock::<crate::math::Vec3>()
+            .is_some_and(|v| v.to_array().iter().zip(&vector.channels).all(|(x, bounds)| is_within(*bounds, *x))),
+        _ => true,
+    };
+    if within { Ok(()) } else { Err(format!("`{name}` of {operands:?} is {result:?}, not within {claimed:?}")) }
+}
+
+fn is_within(bounds: Interval, x: f32) -> bool {
+    match bounds.value() {
+        Some(known) => known.to_bits() == x.to_bits(),
+        None => bounds.nan && x.is_nan() || (bounds.low..=bounds.high).contains(&x),
+    }
+}
+
+#[test]
+fn operations_stay_within_their_bounds() {
+    let engine = Host::new().engine(&std::collections::BTreeSet::new());
+    let mut failures = Vec::new();
+    for (name, count) in OPERATIONS {
+        let mut compiler = Engine::new_raw();
+        compiler.set_optimization_level(rhai::OptimizationLevel::None);
+        let ast = compiler.compile_expression(expression(name, count)).expect("the expressions are well formed");
+        let config = ProptestConfig { cases: 2000, failure_persistence: None, ..ProptestConfig::default() };
+        let operand = prop_oneof![3 => float_operand().boxed(), 1 => int_operand().boxed()];
+        let operands = prop::collection::vec(operand, count);
+        let result = TestRunner::new(config)
+            .run(&operands, |operands| check(&engine, name, &ast, &operands).map_err(TestCaseError::fail));
+        if let Err(error) = result {
+            failures.push(format!("{}", error.to_string().lines().next().unwrap_or_default()));
+        }
+    }
+    assert!(failures.is_empty(), "{}", failures.join("\n"));
+}
