@@ -102,7 +102,7 @@ fn pictures_of_two_runs_compare_as_equal() {
     place.run(&["render", "scene.toml", "-o", "a.png", "--threads", "1"]).exits(0);
     place.run(&["render", "scene.toml", "-o", "b.png", "--tile", "7"]).exits(0);
     let run = place.run(&["compare", "a.png", "b.png"]).exits(0);
-    assert!(run.stdout().contains("largest difference       0.000000"), "{}", run.stdout());
+    assert!(run.stdout().contains("largest difference      0.000000"), "{}", run.stdout());
     place.run(&["render", "scene.toml", "-o", "c.png", "--seed", "5"]).exits(0);
     place.run(&["compare", "a.png", "c.png"]).exits(1);
     place.run(&["compare", "a.png", "c.png", "--tolerance", "1"]).exits(0);

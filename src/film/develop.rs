@@ -13,7 +13,7 @@
 use super::filter::Filter;
 use super::layer::{FilmTile, Layer};
 use super::spread::{Spread, Sums};
-use crate::line::{Fired, LineBuffer, LineType, SeenLine};
+use crate::line::{LineBuffer, LineType, SeenLine};
 use crate::math::{Vec3, Vec4};
 use crate::sample::{PixelRect, SampleBuffer, SampleColor};
 
@@ -252,7 +252,7 @@ impl Field {
                 Gathered::Own
             }
             Self::Lines(kind) => {
-                let shown = |line: &SeenLine| kind.is_none() || kind == strongest_reason(line.fired);
+                let shown = |line: &SeenLine| kind.is_none() || kind == LineType::of(line.fired);
                 if !pixel.lines.iter().any(shown) {
                     return Gathered::Zero;
                 }
@@ -271,20 +271,6 @@ impl Field {
             }
         }
     }
-}
-
-/// The type of a line by the strongest test that fired (DESIGN section 3.6).
-fn strongest_reason(fired: Fired) -> Option<LineType> {
-    [
-        (Fired::MISS, LineType::Outline),
-        (Fired::OBJECT, LineType::Silhouette),
-        (Fired::SHADER, LineType::Material),
-        (Fired::NORMAL, LineType::Crease),
-        (Fired::UV, LineType::Uv),
-        (Fired::FEATURE, LineType::Feature),
-    ]
-    .into_iter()
-    .find_map(|(test, kind)| fired.contains(test).then_some(kind))
 }
 
 /// How a layer reads its value from one sample, if it takes nearest samples. The camera's node of a sample is at the

@@ -69,7 +69,7 @@ fn defaults_are_gltfs() {
     assert!(changed(&scene).is_empty());
     let material = &scene.materials[0];
     assert_eq!((material.name.as_str(), material.double_sided, material.priority), ("material 0", false, None));
-    assert_eq!(scene.scripts[material.script.index()].source.name, "<builtin:default>");
+    assert_eq!(scene.scripts[material.script.index()].source.name, "builtin:default");
     assert!(scene.textures.is_empty());
 }
 

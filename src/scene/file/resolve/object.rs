@@ -81,7 +81,7 @@ impl Resolver<'_> {
         };
         let span = node.span_of("gltf");
         let path = self.path(written, &span);
-        let time = self.context.options.frame.map_or(ModelTime::Seconds(0.0), ModelTime::Frame);
+        let time = self.context.options.frame.map_or(ModelTime::Rest, ModelTime::Frame);
         let placement = Placement {
             name: name.clone(),
             world_from_model,
