@@ -5,6 +5,7 @@
 //! them in opposite order, so a ray can never slip between them; where a function is exactly 0 in single precision it
 //! is computed again in double, where the products are exact.
 
+use super::gamma;
 use crate::math::Vec3;
 
 /// A ray, with what the triangle test needs of it worked out.
@@ -92,10 +93,19 @@ impl Ray {
             return None;
         }
         let determinant = u + v + w;
-        let t_scaled = u * (self.shear.z * a[kz]) + v * (self.shear.z * b[kz]) + w * (self.shear.z * c[kz]);
-        let t = t_scaled / determinant;
+        let [az, bz, cz] = [a[kz], b[kz], c[kz]].map(|z| self.shear.z * z);
+        let t = (u * az + v * bz + w * cz) / determinant;
+
+        // A ray that leaves this very triangle starts a hair off it; `t` must be above its own rounding error, or the
+        // ray would meet what it leaves (pbrt 4th edition, section 6.8.7).
+        let largest = |a: f32, b: f32, c: f32| a.abs().max(b.abs()).max(c.abs());
+        let (x, y, z) = (largest(ax, bx, cx), largest(ay, by, cy), largest(az, bz, cz));
+        let edge = largest(u, v, w);
+        let edge_error = 2.0 * (gamma(2) * x * y + gamma(5) * (y + z) * x + gamma(5) * (x + z) * y);
+        let t_error = 3.0 * (2.0 * gamma(3) * edge * z + edge_error * z) / determinant.abs();
+
         // Written so that NaN (no area, or a coordinate that is not finite) is no hit.
-        if t > 0.0 && t <= t_max {
+        if t > t_error && t <= t_max {
             let front = determinant > 0.0;
             Some(TriangleHit { t, u: v / determinant, v: w / determinant, front })
         } else {
