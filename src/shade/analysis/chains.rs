@@ -169,10 +169,31 @@ impl Walker<'_> {
 
     /// A binary operation.
     pub(super) fn binary(&mut self, operator: &str, a: &Abstract, b: &Abstract) -> Abstract {
+        if let ("+", Shape::Record(x), Shape::Record(y)) = (operator, &a.shape, &b.shape) {
+            return self.merged(x, y);
+        }
         match operators::binary(operator, &a.shape, &b.shape) {
             Some(shape) => self.value(shape, a.all_inputs() | b.all_inputs()),
             None => self.unknown([a, b]),
         }
+    }
+
+    /// A record with the keys of `a` and `b`; a key of both has the value of `b`.
+    pub(super) fn merged(&mut self, a: &Record, b: &Record) -> Abstract {
+        let mut merged = Record { is_params: false, ..a.clone() };
+        for (key, new) in &b.fields {
+            let field = match a.fields.get(key) {
+                Some(old) if !new.always => Field {
+                    value: self.join_values(&old.value, &new.value, new.presence),
+                    always: old.always,
+                    presence: old.presence | new.presence,
+                    place: new.place,
+                },
+                _ => new.clone(),
+            };
+            merged.fields.insert(Rc::clone(key), field);
+        }
+        self.constant(Shape::Record(Rc::new(merged)))
     }
 
     /// One step; with what the target is afterwards if a method has changed it.

@@ -96,9 +96,8 @@ impl Walker<'_> {
     fn mutating_call(&mut self, name: &str, arguments: &[Abstract]) -> (Abstract, Option<Abstract>) {
         if let ("mixin", [a, b]) = (name, arguments)
             && let (Shape::Record(x), Shape::Record(y)) = (&a.shape, &b.shape)
-            && let Some(shape) = operators::merged(x, y)
         {
-            let merged = self.constant(shape);
+            let merged = self.merged(x, y);
             return (self.unit(), Some(merged));
         }
         (self.unknown(arguments), Some(self.unknown(arguments)))
