@@ -11,13 +11,17 @@
 //! 6. [`line`]: image work only; each sample finds the line it sees.
 //! 7. [`film`]: samples are filtered into layers and written as tiles finish.
 //!
-//! [`render`] is the loop over all of it. Nothing here prints or exits; problems are [`diag::Diagnostic`]s.
+//! [`render`] is the loop over all of it. Nothing but [`cli`] prints; problems are [`diag::Diagnostic`]s.
 
+pub mod cli;
 pub mod diag;
 pub mod files;
 pub mod film;
 pub mod line;
 pub mod math;
+pub mod plan;
+pub mod render;
 pub mod sample;
 pub mod scene;
 pub mod shade;
+pub mod trace;

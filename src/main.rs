@@ -1,3 +1,7 @@
 //! The `tusche` command: arguments in, exit code out.
 
-fn main() {}
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    ExitCode::from(tusche::cli::run())
+}

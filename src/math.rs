@@ -23,6 +23,13 @@ pub mod portable {
         tanh = tanhf, exp = expf, exp2 = exp2f, ln = logf, log2 = log2f, log10 = log10f, cbrt = cbrtf,
     }
 
+    /// `sin` in double precision, for constants that are worked out once and must not be a rounding error off.
+    #[inline]
+    #[must_use]
+    pub fn sin_f64(x: f64) -> f64 {
+        libm::sin(x)
+    }
+
     /// The angle of the vector (`x`, `y`) in radians, −π … π.
     #[inline]
     #[must_use]

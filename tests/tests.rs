@@ -1,8 +1,19 @@
 //! All integration tests in one binary. This file is the table of contents.
 
-mod analysis;
-mod film;
+mod common;
+
+// From the outside in: the command, its input, ...
+mod cli;
 mod gltf;
-mod line;
 mod scene_file;
+// ... scripts and what is known of them, ...
+mod analysis;
+mod plan;
 mod shade;
+// ... rays, lines and pixels, ...
+mod film;
+mod line;
+mod trace;
+// ... and the whole.
+mod same_bits;
+mod truth;

@@ -1,8 +1,68 @@
-//! TODO
-use super::{LineBuffer, Rules, Window};
-use crate::sample::SampleBuffer;
+//! The definition as plain loops (DESIGN section 3.2), to be read beside the text. The oracle of [`super::search`].
 
-pub(super) fn find_lines(window: &Window<'_>, target: &SampleBuffer, rules: &Rules) -> LineBuffer {
-    let _ = (window, target, rules);
-    todo!()
+use super::pair::{Found, Pair, distance_squared};
+use super::window::{PathTile, PathWindow};
+use super::{LineCounts, Rules};
+use crate::sample::PixelRect;
+
+/// The line that each target sees which is not yet `lined`, by its sample.
+pub(super) fn find(
+    window: &PathWindow<'_>,
+    targets: &PathTile<'_>,
+    lined: &[bool],
+    rules: &Rules,
+    counts: &mut LineCounts,
+) -> Vec<Found> {
+    let mut found = Vec::new();
+    for (row, &sample) in targets.nodes.sample.iter().enumerate() {
+        if lined[sample as usize] {
+            continue;
+        }
+        let pair = seen(window, targets, row, rules, counts);
+        found.extend(pair.map(|pair| Found { row, path: targets.nodes.path, pair }));
+    }
+    found
+}
+
+/// The pair that the target of a row sees.
+fn seen(
+    window: &PathWindow<'_>,
+    targets: &PathTile<'_>,
+    row: usize,
+    rules: &Rules,
+    counts: &mut LineCounts,
+) -> Option<Pair> {
+    let [x, y] = targets.buffer.pixel_of(targets.nodes.sample[row]);
+    let t = targets.node([x, y], row);
+    let mut seen: Option<Pair> = None;
+
+    // For every neighbour n …
+    for segment in window.segments(PixelRect { x0: x, y0: y, x1: x + 1, y1: y + 1 }.grown(rules.reach())) {
+        let tile = segment.tile;
+        for pixel in (segment.x0..segment.x1).map(|x| [x, segment.y]) {
+            for row in tile.nodes.rows(tile.buffer.pixel_number(pixel)) {
+                let n = tile.node(pixel, row);
+                counts.pairs_tested += 1;
+
+                // … with differ(t, n):
+                if !rules.tests().differ(&t.features, &n.features) {
+                    continue;
+                }
+                // the priority sample p: the larger explicit priority, else the shorter depth, else t.
+                let own = !n.rank.outranks(t.rank);
+                let p = if own { &t } else { &n };
+                // The pair is valid if |x_t − x_n| < r'.
+                let distance_squared = distance_squared(&t, n.pixel, n.offset);
+                if distance_squared >= p.radius_squared {
+                    continue;
+                }
+                // Of all valid pairs the seen one minimises −priority_p, depth_p, |x_t − x_n|, index of n.
+                let pair = Pair { rank: p.rank, distance_squared, pixel, tile: segment.index, row, own };
+                if seen.is_none_or(|best| pair.beats(&best)) {
+                    seen = Some(pair);
+                }
+            }
+        }
+    }
+    seen
 }

@@ -1,6 +1,17 @@
-//! When two samples differ (DESIGN section 3.1).
+//! When two samples differ (DESIGN section 3.1, OG18 section 3.1).
+//!
+//! Each test compares with `>` and is symmetric bit for bit: swapping the samples changes only the signs of differences.
+//! Directions are compared by the chord between them, |a − b| = 2 sin(angle / 2), not by their dot product: it resolves
+//! small angles as finely as large ones, is exactly 0 for equal normals, and makes the normal test a distance test like
+//! that of uv, so that the search bounds both with boxes.
+//!
+//! Limits: the gate makes normals unit to within rounding, so a chord is right to about 10⁻⁷. At 0° any two normals that
+//! are not equal differ (unless the square of their distance underflows, below 10⁻¹⁹); at 180° and more none do.
 
 use bitflags::bitflags;
+
+use crate::math::portable;
+use crate::scene::settings::LineSettings;
 
 bitflags! {
     /// Which tests found a difference.
@@ -19,4 +30,86 @@ bitflags! {
         /// One side is a miss (set beside `OBJECT` or `SHADER`).
         const MISS = 32;
     }
+}
+
+/// The feature attributes of one node.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Features {
+    pub object: u32,
+    pub shader: u32,
+    pub uv: [f32; 2],
+    pub normal: [f32; 3],
+    pub feature: [f32; 3],
+}
+
+impl Features {
+    pub(super) fn is_miss(&self) -> bool {
+        self.object == 0
+    }
+}
+
+/// The enabled tests with their thresholds. A test that is off has the threshold ∞, which nothing exceeds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Tests {
+    pub object: bool,
+    pub shader: bool,
+    /// Largest squared distance in texture space that is no difference.
+    pub uv_squared: f32,
+    /// Largest squared chord between normals that is no difference.
+    pub chord_squared: f32,
+    /// Largest difference of a channel that is no difference.
+    pub feature: f32,
+}
+
+impl Tests {
+    pub(super) fn new(settings: &LineSettings) -> Self {
+        Self {
+            object: settings.object,
+            shader: settings.shader,
+            uv_squared: settings.uv.map_or(f32::INFINITY, |distance| distance.max(0.0) * distance.max(0.0)),
+            chord_squared: settings.normal.map_or(f32::INFINITY, chord_squared),
+            feature: settings.feature.map_or(f32::INFINITY, |difference| difference.max(0.0)),
+        }
+    }
+
+    /// Whether any test finds a difference.
+    #[inline]
+    pub(super) fn differ(&self, a: &Features, b: &Features) -> bool {
+        !self.fired(a, b).is_empty()
+    }
+
+    /// Which tests find a difference.
+    #[inline]
+    pub(super) fn fired(&self, a: &Features, b: &Features) -> Fired {
+        let mut fired = Fired::empty();
+        fired.set(Fired::OBJECT, self.object & (a.object != b.object));
+        fired.set(Fired::SHADER, self.shader & (a.shader != b.shader));
+        if a.is_miss() || b.is_miss() {
+            fired.set(Fired::MISS, !fired.is_empty());
+            return fired;
+        }
+        fired.set(Fired::UV, distance_squared(a.uv, b.uv) > self.uv_squared);
+        fired.set(Fired::NORMAL, distance_squared(a.normal, b.normal) > self.chord_squared);
+        fired.set(Fired::FEATURE, (0..3).any(|i| (a.feature[i] - b.feature[i]).abs() > self.feature));
+        fired
+    }
+}
+
+/// The squared chord of an angle in degrees; ∞ from 180 on, so that rounding makes no opposite normals differ.
+fn chord_squared(degrees: f32) -> f32 {
+    if degrees >= 180.0 {
+        return f32::INFINITY;
+    }
+    let half_chord = portable::sin_f64(f64::from(degrees.max(0.0)).to_radians() / 2.0);
+    (4.0 * half_chord * half_chord) as f32
+}
+
+#[inline]
+fn distance_squared<const N: usize>(a: [f32; N], b: [f32; N]) -> f32 {
+    let mut sum = 0.0;
+    for i in 0..N {
+        let difference = a[i] - b[i];
+        sum += difference * difference;
+    }
+    sum
 }

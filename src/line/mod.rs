@@ -1,18 +1,29 @@
-//! The line pass: which line each sample sees. Pure image work on [`SampleBuffer`]s (OG18 section 3, DESIGN section 3).
+//! The line pass: which line each sample sees. Pure image work on a [`SampleBuffer`](crate::sample::SampleBuffer)'s columns
+//! (OG18 section 3, DESIGN section 3).
 //!
-//! [`brute`] is the definition as plain loops and the oracle for [`search`], which gives the same bits much sooner.
+//! A tile of samples is made ready once ([`TileBounds::new`]); then [`find_lines`] may be called for many tiles at once,
+//! each with a [`Window`] onto the tiles around it. The result is a function of the samples and the rules alone: tile
+//! size, threads and method change no bit.
+//!
+//! `brute` is the definition as plain loops and the oracle for `search`, which gives the same bits much sooner. What
+//! decides is shared by both: `differ`, `pair`, [`Rules`].
 
-pub mod brute;
-pub mod differ;
-pub mod rules;
-pub mod search;
-pub mod window;
+mod bounds;
+mod brute;
+mod differ;
+mod pair;
+mod rules;
+mod search;
+mod style;
+mod window;
 
+pub use bounds::TileBounds;
 pub use differ::Fired;
 pub use rules::Rules;
-pub use window::Window;
+pub use window::{LineTile, Window};
 
-use crate::sample::{NodePath, PixelRect, SampleBuffer};
+use crate::sample::{NodePath, PixelRect};
+use window::PathTile;
 
 /// How lines are searched. Both give the same lines, bit for bit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -65,7 +76,7 @@ pub struct SeenLine {
 pub struct LineBuffer {
     /// The pixels.
     pub rect: PixelRect,
-    /// Sample indices (as in the [`SampleBuffer`] of the same rectangle), rising.
+    /// Sample indices (as in the [`SampleBuffer`](crate::sample::SampleBuffer) of the same rectangle), rising.
     pub samples: Vec<u32>,
     /// The line of each.
     pub lines: Vec<SeenLine>,
@@ -82,12 +93,40 @@ pub struct LineCounts {
     pub lined_samples: u64,
 }
 
-/// Finds the line of every sample of `target`. `window` must hold all samples of the picture within
-/// [`Rules::reach`] pixels around it.
-#[must_use]
-pub fn find_lines(window: &Window<'_>, target: &SampleBuffer, rules: &Rules, method: Method) -> LineBuffer {
-    match method {
-        Method::Exact => search::find_lines(window, target, rules),
-        Method::Brute => brute::find_lines(window, target, rules),
+impl std::ops::AddAssign for LineCounts {
+    fn add_assign(&mut self, other: Self) {
+        self.pairs_tested += other.pairs_tested;
+        self.lined_samples += other.lined_samples;
     }
+}
+
+/// Finds the line of every sample of `target`. `window` must hold all samples of the picture within
+/// [`Rules::reach`] pixels around it, the target's own among them; all its bounds must be made by `rules`.
+///
+/// The paths are taken in breadth-first order, each only for samples that have no line yet and have a node there
+/// (OG18 section 3.4).
+#[must_use]
+pub fn find_lines(window: &Window<'_>, target: LineTile<'_>, rules: &Rules, method: Method) -> LineBuffer {
+    let mut lined = vec![false; target.buffer.samples()];
+    let mut lines: Vec<(u32, SeenLine)> = Vec::new();
+    let mut counts = LineCounts::default();
+    for nodes in &target.buffer.paths {
+        let Some(targets) = PathTile::new(target, nodes.path) else { continue };
+        let window = window.at_path(nodes.path);
+        let found = match method {
+            Method::Exact => search::find(&window, &targets, &lined, rules, &mut counts),
+            Method::Brute => brute::find(&window, &targets, &lined, rules, &mut counts),
+        };
+        for found in found {
+            let sample = nodes.sample[found.row];
+            if let Some(line) = style::style(&window, &targets, &found, rules) {
+                lined[sample as usize] = true;
+                lines.push((sample, line));
+            }
+        }
+    }
+    lines.sort_unstable_by_key(|&(sample, _)| sample);
+    counts.lined_samples = lines.len() as u64;
+    let (samples, lines) = lines.into_iter().unzip();
+    LineBuffer { rect: target.buffer.rect, samples, lines, counts }
 }

@@ -1,34 +1,162 @@
 //! Line settings, made ready for a sample rate.
 
-use crate::scene::settings::LineSettings;
+use super::differ::Tests;
+use crate::math::portable;
+use crate::sample::NodePath;
+use crate::scene::settings::{LineSettings, RayKinds};
 
 /// [`LineSettings`] with all that follows from them and the sample rate worked out once.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rules {
-    /// The settings.
-    pub settings: LineSettings,
-    /// Samples per square pixel and stratum.
-    pub density: f32,
+    settings: LineSettings,
+    /// Widths above this count as this.
+    widest: f32,
+    /// Mean gap to the nearest sample beyond an edge, for a half width of 1 px.
+    unit_gap: f64,
+    tests: Tests,
 }
 
 impl Rules {
-    /// Rules for a sample rate.
+    /// Rules for a sample rate: samples per pixel, at least 1, that are compared with each other.
     #[must_use]
     pub fn new(settings: &LineSettings, samples_per_pixel: u32) -> Self {
-        Self { settings: settings.clone(), density: samples_per_pixel as f32 }
+        // h(r, ρ) = c · (3 / (4 √(2r) ρ))^(2/3) falls with the cube root of r alone: DESIGN section 3.9. c is that of
+        // jittered samples.
+        let per_side = 3.0 / (4.0 * samples_per_pixel.max(1) as f32);
+        let unit_gap = 0.84 * portable::pow(per_side, 2.0 / 3.0) / portable::cbrt(2.0);
+        Self {
+            widest: settings.max_width.max(0.0),
+            unit_gap: f64::from(unit_gap),
+            tests: Tests::new(settings),
+            settings: settings.clone(),
+        }
+    }
+
+    /// The same rules, knowing that no width in the picture is above `width` pixels: less reach, so smaller halos. A
+    /// wider line counts as this wide.
+    #[must_use]
+    pub fn with_widest(mut self, width: f32) -> Self {
+        self.widest = self.widest.min(width.max(0.0));
+        self
+    }
+
+    /// The settings that the rules were made from.
+    #[must_use]
+    pub fn settings(&self) -> &LineSettings {
+        &self.settings
+    }
+
+    pub(super) fn tests(&self) -> &Tests {
+        &self.tests
     }
 
     /// The half width within which a neighbour makes a line of this full width visible: half the effective width,
-    /// widened by the thinning compensation (DESIGN section 3.9). 0 if the width is no line.
+    /// widened by the thinning compensation (DESIGN section 3.9). 0 if the width is no line. In pixels.
     #[must_use]
     pub fn radius(&self, width: f32) -> f32 {
-        let _ = width;
-        todo!()
+        let width = width.min(self.widest);
+        if width <= 0.0 {
+            return 0.0;
+        }
+        let half = width.max(self.settings.min_width) / 2.0;
+        if self.settings.width_compensation { widened(half, self.unit_gap) } else { half }
+    }
+
+    /// How much of the sample a line of this full width covers: 1, or less below the minimum width (OG18 section 3.5).
+    #[must_use]
+    pub fn alpha(&self, width: f32) -> f32 {
+        let minimum = self.settings.min_width;
+        if minimum > 0.0 { (width.min(self.widest) / minimum).clamp(0.0, 1.0) } else { 1.0 }
     }
 
     /// How far a line reaches at most, in whole pixels: neighbours farther than this many pixels never matter.
     #[must_use]
     pub fn reach(&self) -> i32 {
-        todo!()
+        self.radius(self.widest).ceil() as i32
+    }
+
+    /// Whether nodes at this path draw lines: the camera's if cameras do, any other if all kinds of its events do.
+    #[must_use]
+    pub fn draws(&self, path: NodePath) -> bool {
+        let mut needed = RayKinds::empty();
+        needed.set(RayKinds::CAMERA, path == NodePath::CAMERA);
+        needed.set(RayKinds::REFLECTION, path.has_reflection());
+        needed.set(RayKinds::REFRACTION, path.has_refraction());
+        self.settings.paths.contains(needed)
+    }
+}
+
+/// The r with r − gap / ∛r = half.
+///
+/// With s = ∛r that is s⁴ − half · s − gap = 0: convex for s > 0, so Newton's steps from above fall to the root and stop
+/// by themselves. ∛half + ∜gap is above it; it decides only how many steps are needed.
+fn widened(half: f32, gap: f64) -> f32 {
+    let half = f64::from(half);
+    // The factor makes up for the rounding of the f32 root.
+    let mut s = (f64::from(portable::cbrt(half as f32)) + gap.sqrt().sqrt()) * (1.0 + 1e-6);
+    loop {
+        let cube = s * s * s;
+        let next = s - (s * cube - half * s - gap) / (4.0 * cube - half);
+        if next < s {
+            s = next;
+        } else {
+            // As near as f64 comes.
+            return cube as f32;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn rules(samples: u32, change: impl FnOnce(&mut LineSettings)) -> Rules {
+        let mut settings = LineSettings { max_width: 64.0, ..LineSettings::default() };
+        change(&mut settings);
+        Rules::new(&settings, samples)
+    }
+
+    #[test]
+    fn the_paper_radius_is_half_the_effective_width() {
+        let rules = rules(16, |s| s.width_compensation = false);
+        let radii = [-1.0, 0.0, 0.25, 0.5, 3.0, 64.0, 1e9].map(|width| rules.radius(width));
+        assert_eq!(radii, [0.0, 0.0, 0.25, 0.25, 1.5, 32.0, 32.0]);
+        assert_eq!(rules.reach(), 32);
+        assert_eq!(rules.clone().with_widest(2.5).reach(), 2);
+        assert_eq!(rules.clone().with_widest(0.0).reach(), 0);
+        assert_eq!(rules.with_widest(f32::INFINITY).reach(), 32);
+    }
+
+    #[test]
+    fn compensation_solves_its_equation() {
+        for samples in [1, 4, 16, 64, 1024] {
+            let rules = rules(samples, |s| s.min_width = 0.0);
+            for width in [1e-6, 0.1, 0.5, 1.0, 2.0, 8.0, 64.0_f32] {
+                let r = f64::from(rules.radius(width));
+                let h = 0.84 * (3.0 / (4.0 * (2.0 * r).sqrt() * f64::from(samples))).powf(2.0 / 3.0);
+                let error = r - h - f64::from(width) / 2.0;
+                assert!(error.abs() < 1e-6 * r.max(1.0), "{samples} samples, {width} px: off by {error}");
+            }
+        }
+    }
+
+    #[test]
+    fn alpha_is_the_part_of_the_minimum_width() {
+        let rules = rules(16, |_| ());
+        assert_eq!([0.0, 0.125, 0.25, 0.5, 9.0].map(|width| rules.alpha(width)), [0.0, 0.25, 0.5, 1.0, 1.0]);
+        let without = self::rules(16, |s| s.min_width = 0.0);
+        assert_eq!(without.alpha(1e-9), 1.0);
+    }
+
+    #[test]
+    fn a_path_draws_if_all_its_kinds_do() {
+        let camera = NodePath::CAMERA;
+        let paths = [camera, camera.reflected(), camera.refracted(), camera.reflected().refracted()];
+        let drawn = |kinds| paths.map(|path| rules(16, |s| s.paths = kinds).draws(path));
+        assert_eq!(drawn(RayKinds::all()), [true; 4]);
+        assert_eq!(drawn(RayKinds::CAMERA), [true, false, false, false]);
+        assert_eq!(drawn(RayKinds::REFLECTION), [false, true, false, false]);
+        assert_eq!(drawn(RayKinds::REFLECTION | RayKinds::REFRACTION), [false, true, true, true]);
+        assert_eq!(drawn(RayKinds::empty()), [false; 4]);
     }
 }

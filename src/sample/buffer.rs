@@ -1,4 +1,10 @@
-//! The columns of a rectangle of samples, and how they are filled.
+//! The columns of a rectangle of samples.
+//!
+//! Invariants, kept by the [builder](super::builder): all numbers have passed the [gate](super::gate); rows of a path
+//! are sorted by sample and each sample has at most one; the camera's path comes first and has one row per sample, so
+//! there row and sample are the same number; a column whose values are all equal is [`Column::Constant`].
+
+use std::ops::Range;
 
 use super::gate::GateCounts;
 use super::path::NodePath;
@@ -74,7 +80,7 @@ pub enum Column<T> {
 
 impl<T: Copy> Column<T> {
     /// The value of a row.
-    #[inline]
+    #[inline(always)]
     #[must_use]
     pub fn get(&self, row: usize) -> T {
         match self {
@@ -166,6 +172,12 @@ pub struct NodeColumnSet {
     pub contribution: bool,
 }
 
+impl NodeColumnSet {
+    /// Every column.
+    pub const ALL: Self =
+        Self { uv: true, normal: true, feature: true, lines: true, throughput: true, contribution: true };
+}
+
 /// All nodes at one path, in the order of their samples.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NodeColumns {
@@ -220,58 +232,75 @@ pub struct SampleBuffer {
     pub gate: Vec<GateCounts>,
 }
 
-/// Fills a [`SampleBuffer`]. Nodes of one path may arrive in any order of samples.
-#[derive(Debug)]
-pub struct SampleBufferBuilder {
-    rect: PixelRect,
+impl NodeColumns {
+    /// The rows of a pixel, by its number in the rectangle (row by row).
+    #[inline]
+    #[must_use]
+    pub fn rows(&self, pixel: usize) -> Range<usize> {
+        self.first[pixel] as usize..self.first[pixel + 1] as usize
+    }
+
+    /// The row of a sample, if it has a node at this path.
+    #[must_use]
+    pub fn row_of(&self, sample: u32, samples_per_pixel: u32) -> Option<usize> {
+        let rows = self.rows((sample / samples_per_pixel) as usize);
+        let found = self.sample[rows.clone()].binary_search(&sample).ok()?;
+        Some(rows.start + found)
+    }
+
+    /// Bytes of heap memory.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        (self.first.len() + self.sample.len()) * size_of::<u32>()
+            + self.object.bytes()
+            + self.shader.bytes()
+            + self.uv.bytes()
+            + self.normal.bytes()
+            + self.feature.bytes()
+            + self.depth.bytes()
+            + self.line_color.bytes()
+            + self.line_width.bytes()
+            + self.priority.bytes()
+            + self.throughput.bytes()
+            + self.contribution.bytes()
+    }
 }
 
-/// What a [`SampleBufferBuilder`] keeps.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct SampleLayout {
-    /// Samples per pixel.
-    pub samples_per_pixel: u32,
-    /// Columns of the nodes.
-    pub columns: NodeColumnSet,
-    /// Whether the camera's nodes keep their world position.
-    pub position: bool,
-    /// How many extra outputs the camera's nodes keep.
-    pub aovs: usize,
-    /// Line widths above this are clamped by the gate.
-    pub max_width: f32,
-    /// Materials in the scene: `shader` values are 0 … this, included.
-    pub materials: usize,
-}
-
-impl SampleBufferBuilder {
-    /// An empty buffer for a rectangle: black, transparent samples without nodes.
+impl SampleBuffer {
+    /// Number of samples.
     #[must_use]
-    pub fn new(rect: PixelRect, layout: &SampleLayout) -> Self {
-        let _ = layout;
-        Self { rect }
+    pub fn samples(&self) -> usize {
+        self.offset.len()
     }
 
-    /// Sets a sample's place in its pixel and its colour. The gate checks the colour; `shader` is who made it.
-    pub fn set_sample(&mut self, sample: u32, offset: [f32; 2], color: SampleColor, shader: u32) {
-        let _ = (sample, offset, color, shader, self.rect);
-        todo!()
-    }
-
-    /// Sets what only the camera's node of a sample keeps: position and extra outputs (as many as the layout says).
-    pub fn set_extras(&mut self, sample: u32, position: [f32; 3], aovs: &[[f32; 3]]) {
-        let _ = (sample, position, aovs);
-        todo!()
-    }
-
-    /// Adds a node. Columns that the layout does not keep are dropped here; the gate checks the others.
-    pub fn push(&mut self, path: NodePath, sample: u32, node: Node) {
-        let _ = (path, sample, node);
-        todo!()
-    }
-
-    /// Sorts the nodes and closes the buffer. Every sample must have a camera node by now.
+    /// The number of a pixel in the rectangle, row by row. The pixel must lie inside.
+    #[inline]
     #[must_use]
-    pub fn finish(self) -> SampleBuffer {
-        todo!()
+    pub fn pixel_number(&self, pixel: [i32; 2]) -> usize {
+        (pixel[1] - self.rect.y0) as usize * self.rect.width() as usize + (pixel[0] - self.rect.x0) as usize
+    }
+
+    /// The pixel of a sample.
+    #[must_use]
+    pub fn pixel_of(&self, sample: u32) -> [i32; 2] {
+        let (pixel, width) = (sample / self.samples_per_pixel, self.rect.width());
+        [self.rect.x0 + (pixel % width) as i32, self.rect.y0 + (pixel / width) as i32]
+    }
+
+    /// The nodes at a path, if any sample has one there.
+    #[must_use]
+    pub fn nodes(&self, path: NodePath) -> Option<&NodeColumns> {
+        self.paths.binary_search_by_key(&path, |nodes| nodes.path).ok().map(|found| &self.paths[found])
+    }
+
+    /// Bytes of heap memory.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        self.offset.len() * size_of::<[f32; 2]>()
+            + self.color.len() * size_of::<SampleColor>()
+            + self.position.bytes()
+            + self.aovs.iter().map(Column::bytes).sum::<usize>()
+            + self.paths.iter().map(NodeColumns::bytes).sum::<usize>()
+            + self.gate.len() * size_of::<GateCounts>()
     }
 }

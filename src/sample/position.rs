@@ -32,7 +32,7 @@ impl SamplePositions {
     #[must_use]
     pub fn new(samples: u32, seed: u64) -> Self {
         let columns = (f64::from(samples).sqrt().ceil() as u32).max(1);
-        let exact = (1..=columns).rev().find(|c| samples % c == 0).filter(|c| samples / c <= 2 * c);
+        let exact = (1..=columns).rev().find(|c| samples.is_multiple_of(*c)).filter(|c| samples / c <= 2 * c);
         let (columns, rows) = match exact {
             Some(c) => (samples / c, c),
             None => (columns, samples.div_ceil(columns)),
@@ -85,5 +85,42 @@ fn permute(mut i: u32, length: u32, key: u32) -> u32 {
         if i < length {
             return (i.wrapping_add(key)) % length;
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn offsets_lie_in_their_pixel_each_in_a_cell_of_its_own() {
+        for samples in [1, 2, 3, 4, 5, 7, 9, 11, 16, 64, 100] {
+            let positions = SamplePositions::new(samples, 3);
+            let (columns, rows) = (positions.columns, positions.rows);
+            assert!(columns * rows >= samples && columns * rows < samples + columns.max(rows), "{samples}");
+            for pixel in [[0, 0], [-7, 12], [7679, 4319]] {
+                let cells: std::collections::BTreeSet<_> = (0..samples)
+                    .map(|sample| {
+                        let [x, y] = positions.offset(pixel, sample);
+                        assert!((0.0..1.0).contains(&x) && (0.0..1.0).contains(&y));
+                        // A jitter near 1 may round up to the next cell's border.
+                        let cell = |x: f32, count: u32| ((x * count as f32) - 1e-5).max(0.0) as u32;
+                        (cell(x, columns), cell(y, rows))
+                    })
+                    .collect();
+                assert_eq!(cells.len(), samples as usize, "{samples} samples at {pixel:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn seeds_and_pixels_decorrelate() {
+        let offset = |seed, pixel| SamplePositions::new(16, seed).offset(pixel, 5);
+        assert_ne!(offset(0, [3, 4]), offset(1, [3, 4]));
+        assert_ne!(offset(0, [3, 4]), offset(1 << 32, [3, 4]));
+        assert_ne!(offset(0, [3, 4]), offset(0, [4, 3]));
+        let mean: f32 = (0..1000).map(|x| offset(0, [x, 0])[0]).sum::<f32>() / 1000.0;
+        // Sample 5 of 4×4 lies in the second column: 0.25 … 0.5, deviation of the mean 0.0023.
+        assert!((mean - 0.375).abs() < 0.01, "{mean}");
     }
 }

@@ -31,11 +31,13 @@ pub struct RenderSettings {
     pub seed: u64,
     /// What rays that leave the scene see.
     pub background: Background,
+    /// Radiance of uniform light from all around that scatters on surfaces without casting shadows, linear RGB.
+    pub ambient: Vec3,
     /// The pixel filter.
     pub filter: FilterKind,
     /// Its radius in pixels, > 0.
     pub filter_radius: f32,
-    /// Most mirror reflections in a row along a path.
+    /// Most mirror reflections along a path.
     pub reflection_depth: u32,
     /// Most refractions along a path.
     pub refraction_depth: u32,
@@ -48,6 +50,7 @@ impl Default for RenderSettings {
             samples: 16,
             seed: 0,
             background: Background::Color(Vec3::splat(0.9)),
+            ambient: Vec3::splat(0.2),
             filter: FilterKind::BlackmanHarris,
             filter_radius: 1.5,
             reflection_depth: 4,

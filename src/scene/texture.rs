@@ -1,9 +1,31 @@
-//! Images that scripts look up.
+//! Images that scripts look up: decoding, and lookups.
+//!
+//! An [`Image`] holds finite numbers only, so a lookup of finite pixels is finite and inside [`Texture::range`], whatever
+//! the texture coordinates are: the shading host may bound a shader's outputs by it. There are no mipmaps; a picture
+//! takes many samples per pixel, and each looks up the full image.
 
-use std::sync::Arc;
+use std::io::Cursor;
+use std::path::Path;
+use std::sync::{Arc, LazyLock};
+
+use image::{DynamicImage, ImageReader};
 
 use super::ids::TextureId;
-use crate::math::{Affine2, Vec2, Vec4};
+use crate::diag::Diagnostic;
+use crate::math::{Affine2, Vec2, Vec4, linear_from_srgb};
+
+/// The largest width or height of an image, in pixels.
+pub const MAX_SIDE: u32 = 32_768;
+
+/// The most pixels of an image. A small file can claim a huge image; this bounds what it can make us allocate.
+pub const MAX_PIXELS: u64 = 1 << 27;
+
+/// Float pixels are clamped to ± this, so that interpolating between two of them cannot overflow.
+const MAX_FLOAT: f32 = 1e30;
+
+/// Linear values of the 256 sRGB-encoded ones.
+static LINEAR_FROM_SRGB8: LazyLock<[f32; 256]> =
+    LazyLock::new(|| std::array::from_fn(|i| linear_from_srgb(i as f32 / 255.0)));
 
 /// What happens outside 0 … 1.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -79,38 +101,209 @@ pub struct TextureRef {
     pub transform: Affine2,
 }
 
-impl Texture {
-    /// Least and greatest linear value of each channel.
-    #[must_use]
-    pub fn range(&self) -> ([f32; 4], [f32; 4]) {
-        let mut low = [f32::INFINITY; 4];
-        let mut high = [f32::NEG_INFINITY; 4];
-        let mut include = |pixel: [f32; 4]| {
-            for channel in 0..4 {
-                low[channel] = low[channel].min(pixel[channel]);
-                high[channel] = high[channel].max(pixel[channel]);
-            }
-        };
-        match &self.image.pixels {
-            Pixels::Rgba8 { data, srgb } => data.iter().for_each(|pixel| {
-                let mut linear = pixel.map(|byte| f32::from(byte) / 255.0);
-                if *srgb {
-                    linear[..3].iter_mut().for_each(|x| *x = crate::math::linear_from_srgb(*x));
-                }
-                include(linear);
-            }),
-            Pixels::Rgba32F { data } => data.iter().for_each(|pixel| include(*pixel)),
+impl Image {
+    /// The linear value of a pixel; `x` and `y` are inside the image.
+    fn pixel(&self, x: u32, y: u32) -> Vec4 {
+        let index = y as usize * self.width as usize + x as usize;
+        match &self.pixels {
+            Pixels::Rgba8 { data, srgb } => linear_from_rgba8(data[index], *srgb),
+            Pixels::Rgba32F { data } => Vec4::from(data[index]),
         }
-        (low, high)
     }
+}
 
-    /// The pixel values at a place, filtered, linear.
+fn linear_from_rgba8([r, g, b, a]: [u8; 4], srgb: bool) -> Vec4 {
+    let plain = |c: u8| f32::from(c) / 255.0;
+    if srgb {
+        let [r, g, b] = [r, g, b].map(|c| LINEAR_FROM_SRGB8[usize::from(c)]);
+        Vec4::new(r, g, b, plain(a))
+    } else {
+        Vec4::new(plain(r), plain(g), plain(b), plain(a))
+    }
+}
+
+impl Texture {
+    /// The linear value at a place: u from the left, v down from the top, the image being 0 … 1 (as in glTF).
+    ///
+    /// Texture coordinates that are not finite read as 0. Alpha is not multiplied in.
     #[must_use]
     pub fn sample(&self, uv: Vec2) -> Vec4 {
-        let _ = uv;
-        match &self.image.pixels {
-            Pixels::Rgba8 { data, .. } => Vec4::from(data[0].map(|c| f32::from(c) / 255.0)),
-            Pixels::Rgba32F { data } => Vec4::from(data[0]),
+        let image = &*self.image;
+        let u = fold(uv.x, self.wrap[0]);
+        let v = fold(uv.y, self.wrap[1]);
+        match self.filter {
+            TextureFilter::Nearest => {
+                let near = |t: f32, size: u32| ((t * size as f32) as u32).min(size - 1);
+                image.pixel(near(u, image.width), near(v, image.height))
+            }
+            TextureFilter::Linear => {
+                let (x0, x1, fx) = neighbors(u, image.width, self.wrap[0]);
+                let (y0, y1, fy) = neighbors(v, image.height, self.wrap[1]);
+                let top = between(image.pixel(x0, y0), image.pixel(x1, y0), fx);
+                let bottom = between(image.pixel(x0, y1), image.pixel(x1, y1), fx);
+                between(top, bottom, fy)
+            }
         }
     }
+
+    /// The least and the greatest linear value of each channel (red, green, blue, alpha): no lookup leaves them.
+    ///
+    /// Looks at every pixel; callers keep the result.
+    #[must_use]
+    pub fn range(&self) -> ([f32; 4], [f32; 4]) {
+        match &self.image.pixels {
+            Pixels::Rgba8 { data, srgb } => {
+                // Decoding is monotonic, so the bounds of the codes are enough.
+                let (least, greatest) = bounds(data.iter().copied(), [u8::MAX; 4], [0; 4], Ord::min, Ord::max);
+                (linear_from_rgba8(least, *srgb).into(), linear_from_rgba8(greatest, *srgb).into())
+            }
+            Pixels::Rgba32F { data } => {
+                let (most, least) = ([f32::INFINITY; 4], [f32::NEG_INFINITY; 4]);
+                bounds(data.iter().copied(), most, least, f32::min, f32::max)
+            }
+        }
+    }
+}
+
+fn bounds<T: Copy>(
+    pixels: impl Iterator<Item = [T; 4]>,
+    most: [T; 4],
+    least: [T; 4],
+    min: impl Fn(T, T) -> T,
+    max: impl Fn(T, T) -> T,
+) -> ([T; 4], [T; 4]) {
+    pixels.fold((most, least), |(low, high), pixel| {
+        (std::array::from_fn(|c| min(low[c], pixel[c])), std::array::from_fn(|c| max(high[c], pixel[c])))
+    })
+}
+
+/// A texture coordinate brought into 0 … 1 (both included).
+fn fold(t: f32, wrap: Wrap) -> f32 {
+    if !t.is_finite() {
+        return 0.0;
+    }
+    match wrap {
+        Wrap::Repeat => t - t.floor(),
+        Wrap::Mirror => {
+            let t = (t * 0.5 - (t * 0.5).floor()) * 2.0;
+            if t > 1.0 { 2.0 - t } else { t }
+        }
+        Wrap::Clamp => t.clamp(0.0, 1.0),
+    }
+}
+
+/// The two pixels whose centers are around a folded coordinate, and how far it is from the first to the second.
+fn neighbors(t: f32, size: u32, wrap: Wrap) -> (u32, u32, f32) {
+    let x = t * size as f32 - 0.5;
+    let left = x.floor();
+    // From −1 to size − 1, so the cast is exact.
+    let left_index = left as i64;
+    let size = i64::from(size);
+    let inside = |i: i64| match wrap {
+        Wrap::Repeat => i.rem_euclid(size) as u32,
+        // At a mirror's seam the pixel beyond the border is the border pixel itself.
+        Wrap::Mirror | Wrap::Clamp => i.clamp(0, size - 1) as u32,
+    };
+    (inside(left_index), inside(left_index + 1), x - left)
+}
+
+/// Between two values, and never beyond either whatever the rounding.
+fn between(a: Vec4, b: Vec4, t: f32) -> Vec4 {
+    (a + (b - a) * t).clamp(a.min(b), a.max(b))
+}
+
+/// Decodes a PNG, JPEG, Radiance HDR or OpenEXR image; the content tells which, not the name.
+///
+/// Eight bits a channel stay eight bits. More, and floats, become linear floats; `srgb` says how integer colour (not
+/// alpha) is encoded. Colour profiles and gamma chunks are ignored, as glTF demands. In float images, NaN reads as 0.
+///
+/// # Errors
+/// If the format is not known, the data are damaged, or the image is larger than [`MAX_SIDE`] or [`MAX_PIXELS`].
+/// `path` only names the image in messages.
+pub fn decode(path: &Path, bytes: &[u8], srgb: bool) -> Result<Image, Diagnostic> {
+    let fault = |message: String| Diagnostic::error(message).in_file(path);
+    if bytes.starts_with(&[0x76, 0x2f, 0x31, 0x01]) {
+        return decode_exr(bytes).map_err(fault);
+    }
+    let reader = || ImageReader::new(Cursor::new(bytes)).with_guessed_format();
+    let unreadable = |error: &dyn std::fmt::Display| fault(format!("cannot decode this image: {error}"));
+    let sized = reader().map_err(|error| unreadable(&error))?;
+    if sized.format().is_none() {
+        return Err(
+            fault("this is not an image that Tusche reads".into()).hint("PNG, JPEG, Radiance HDR and OpenEXR are")
+        );
+    }
+    let (width, height) = sized.into_dimensions().map_err(|error| unreadable(&error))?;
+    check_size(u64::from(width), u64::from(height)).map_err(fault)?;
+    let mut limited = reader().map_err(|error| unreadable(&error))?;
+    let mut limits = image::Limits::default();
+    limits.max_alloc = Some(MAX_PIXELS * 16);
+    limited.limits(limits);
+    let image = limited.decode().map_err(|error| unreadable(&error))?;
+    let pixels = match image {
+        DynamicImage::ImageLuma8(_)
+        | DynamicImage::ImageLumaA8(_)
+        | DynamicImage::ImageRgb8(_)
+        | DynamicImage::ImageRgba8(_) => {
+            Pixels::Rgba8 { data: image.into_rgba8().pixels().map(|pixel| pixel.0).collect(), srgb }
+        }
+        DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_) => {
+            Pixels::Rgba32F { data: image.into_rgba32f().pixels().map(|pixel| pixel.0.map(finite)).collect() }
+        }
+        _ => {
+            let linear = |c: u16| {
+                let value = f32::from(c) / 65_535.0;
+                if srgb { linear_from_srgb(value) } else { value }
+            };
+            let pixel = |[r, g, b, a]: [u16; 4]| [linear(r), linear(g), linear(b), f32::from(a) / 65_535.0];
+            Pixels::Rgba32F { data: image.into_rgba16().pixels().map(|p| pixel(p.0)).collect() }
+        }
+    };
+    Ok(Image { width, height, pixels })
+}
+
+fn decode_exr(bytes: &[u8]) -> Result<Image, String> {
+    use exr::prelude::{ReadChannels, ReadLayers, read};
+
+    let unreadable = |error: &exr::error::Error| format!("cannot decode this image: {error}");
+    let meta =
+        exr::meta::MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(|error| unreadable(&error))?;
+    for header in &meta.headers {
+        check_size(header.layer_size.width() as u64, header.layer_size.height() as u64)?;
+    }
+    let image = read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .rgba_channels(
+            |size, _| (size.width(), vec![[0.0_f32; 4]; size.area()]),
+            |(width, pixels), position, (r, g, b, a): (f32, f32, f32, f32)| {
+                pixels[position.y() * *width + position.x()] = [r, g, b, a].map(finite);
+            },
+        )
+        .first_valid_layer()
+        .all_attributes()
+        .from_buffered(Cursor::new(bytes))
+        .map_err(|error| unreadable(&error))?;
+    let (width, data) = image.layer_data.channel_data.pixels;
+    let height = data.len() / width.max(1);
+    Ok(Image { width: width as u32, height: height as u32, pixels: Pixels::Rgba32F { data } })
+}
+
+fn check_size(width: u64, height: u64) -> Result<(), String> {
+    let side = u64::from(MAX_SIDE);
+    if width == 0 || height == 0 {
+        Err("this image has no pixels".into())
+    } else if width > side || height > side || width * height > MAX_PIXELS {
+        Err(format!(
+            "this image of {width} × {height} pixels is too large: at most {side} pixels each way and {} million in all \
+             are read",
+            MAX_PIXELS / 1_000_000
+        ))
+    } else {
+        Ok(())
+    }
+}
+
+fn finite(value: f32) -> f32 {
+    if value.is_nan() { 0.0 } else { value.clamp(-MAX_FLOAT, MAX_FLOAT) }
 }

@@ -17,10 +17,10 @@ use super::library;
 
 /// Operations of one call of `surface` or `params`: enough for thousands of noise lookups, and a fraction of a second.
 pub(super) const MAX_OPERATIONS: u64 = 500_000;
-/// Calls inside calls; as much as fits the stack of a render thread.
-pub(super) const MAX_CALL_DEPTH: usize = 32;
-/// Brackets inside brackets in the script's text.
-pub(super) const MAX_EXPRESSION_DEPTH: usize = 48;
+/// Calls inside calls. This times the next stays well within the stack of a render thread, which a test checks.
+pub(super) const MAX_CALL_DEPTH: usize = 8;
+/// Levels of nesting in the text of a function: each block, bracket and operator adds some.
+pub(super) const MAX_EXPRESSION_DEPTH: usize = 64;
 /// Bytes of a text.
 pub(super) const MAX_TEXT: usize = 4096;
 /// Elements of an array, with those of arrays in it.
@@ -31,8 +31,10 @@ pub(super) const MAX_MAP: usize = 256;
 /// The library of functions that scripts see: Tusche's own, and what a Rust user registers (DESIGN section 4.5).
 #[derive(Clone, Default)]
 pub struct Host {
-    packages: Vec<Arc<dyn Fn(&mut rhai::Engine) + Send + Sync>>,
+    packages: Vec<Register>,
 }
+
+type Register = Arc<dyn Fn(&mut Engine) + Send + Sync>;
 
 impl fmt::Debug for Host {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -48,7 +50,8 @@ impl Host {
     }
 
     /// The same host with more functions: `register` is called on every engine that is made (one per thread). The
-    /// limits and the sandbox are set afterwards, so it cannot loosen them.
+    /// limits and the sandbox are set afterwards, so it cannot loosen them. A constant is a function without parameters.
+    /// Pictures do not depend on thread or tile order only as long as the functions depend on nothing but their arguments.
     #[must_use]
     pub fn with(mut self, register: impl Fn(&mut rhai::Engine) + Send + Sync + 'static) -> Self {
         self.packages.push(Arc::new(register));

@@ -130,7 +130,10 @@ impl<'a> Shading<'a> {
         output::start(outputs, self.shaders.aovs().len());
         let shader = self.shaders.of(material);
         let constant = shader.mode() == Mode::Constant;
-        self.hold(hits, constant);
+        if !constant {
+            // Scripts can hold only what is owned; a copy for each batch costs little beside running it.
+            self.batch = Arc::new(hits.clone());
+        }
         for row in 0..hits.len {
             if let Some(fixed) = &self.memories[material.index()].fixed {
                 repeat(fixed, hits.len - row, wanted, outputs, errors);
@@ -141,18 +144,6 @@ impl<'a> Shading<'a> {
                 self.memories[material.index()].fixed = Some(result.clone());
             }
             repeat(&result, 1, wanted, outputs, errors);
-        }
-    }
-
-    /// Copies the batch to where scripts can share it.
-    fn hold(&mut self, hits: &HitBatch, constant: bool) {
-        if constant {
-            return;
-        }
-        // No script outlives its run, so nothing else holds the batch, and its memory is used again.
-        match Arc::get_mut(&mut self.batch) {
-            Some(batch) => batch.clone_from(hits),
-            None => self.batch = Arc::new(hits.clone()),
         }
     }
 

@@ -10,11 +10,13 @@
 
 pub mod analysis;
 pub mod batch;
+pub mod bsdf;
 pub mod builtin;
 mod fault;
 pub mod host;
 pub mod interpret;
 pub mod library;
+pub mod lighting;
 pub mod names;
 mod output;
 pub mod params;
@@ -23,8 +25,10 @@ mod script;
 
 pub use analysis::Analysis;
 pub use batch::{HitBatch, LightSample, OutputBatch};
+pub use bsdf::Bsdf;
 pub use host::Host;
 pub use interpret::{ShadeErrors, Shading};
+pub use lighting::Lighting;
 pub use names::{InputSet, OutputSet, PathKind};
 pub use params::{Params, Value};
 pub use program::{Mode, Shader, Shaders};

@@ -136,6 +136,11 @@ impl Shaders {
         Ok((Self { shaders, aovs, host: host.clone(), parameters }, faults))
     }
 
+    /// All shaders, in the order of the materials.
+    pub fn iter(&self) -> impl Iterator<Item = &Shader> {
+        self.shaders.iter()
+    }
+
     /// The shader of a material.
     #[must_use]
     pub fn of(&self, material: MaterialId) -> &Shader {

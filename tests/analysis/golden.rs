@@ -1,6 +1,6 @@
 //! One test for each construct.
 
-use super::{analysis, assert_dump, body, rgb, texture_ref};
+use super::{analysis, assert_dump, body, rgb};
 use tusche::shade::Value;
 
 #[test]
@@ -27,7 +27,7 @@ fn inputs_and_arithmetic() {
     assert_dump(
         &body("let n = hit.normal; #{ feature: n * 0.5 + vec3(0.5), line_width: 2.0 - clamp(hit.uv.x, 0.0, 1.0) }"),
         "inputs: normal uv
-         feature: always, [-5.0663948e-7, 1.0000005], from normal
+         feature: always, [-4.7683716e-7, 1.0000005], from normal
          line_width: always, [1.0, 2.0], from uv",
     );
 }

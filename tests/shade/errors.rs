@@ -206,22 +206,40 @@ fn an_endless_shader_is_run_once_and_then_given_up() {
 #[test]
 fn recursion_without_an_end() {
     let said = complaint("fn down(n) { down(n + 1) }\nfn surface(hit, p) {\n    down(0)\n}");
-    assert!(said.contains("functions call each other more than 32 deep"), "{said}");
+    assert!(said.contains("functions call each other more than 8 deep"), "{said}");
     assert!(said.contains("first.rhai:3:5\n"), "{said}");
 }
 
+/// Calls inside calls, each inside as much of every kind of nesting as the parser lets through.
 #[test]
-fn the_deepest_allowed_nesting_fits_a_small_stack() {
-    // Calls inside calls, each in as many brackets as the parser lets through.
-    let brackets = 10;
-    let script = format!(
-        "fn down(n) {{ {}if n > 30 {{ n }} else {{ down(n + 1) }}{} }} fn surface(hit, p) {{ #{{ line_width: down(0) }} }}",
-        "(1 * ".repeat(brackets),
-        ")".repeat(brackets)
-    );
-    let run = move || shade(&scene(&[&script]), &Host::new(), &batch(1)).0.line_width[0];
-    let thread = std::thread::Builder::new().stack_size(2 << 20).spawn(run).expect("a thread starts");
-    assert_eq!(thread.join().expect("the stack is large enough"), Some(31.0));
+fn the_deepest_allowed_nesting_fits_the_stack_of_a_thread() {
+    for (open, close) in [
+        ("(1 * ", ")"),
+        ("abs(", ")"),
+        ("if n >= 0 { ", " } else { 0 }"),
+        ("for i in 0..1 { return ", " }"),
+        ("{ let x = ", "; x }"),
+        ("[", "][0]"),
+        ("#{ a: ", " }.a"),
+        ("switch n { -1 => 0, _ => ", " }"),
+        ("1 + mix(0, ", ", 1.0)"),
+    ] {
+        let script = |depth: usize| {
+            format!(
+                "fn down(n) {{ {}if n > 6 {{ n }} else {{ down(n + 1) }}{} }} \
+                 fn surface(hit, p) {{ #{{ line_width: down(0) }} }}",
+                open.repeat(depth),
+                close.repeat(depth)
+            )
+        };
+        let compiles = |depth: &usize| Shaders::compile(&scene(&[&script(*depth)]), &Host::new()).is_ok();
+        let depth = (1..99).rev().find(compiles).expect("a little nesting is allowed");
+        assert!(depth >= 9, "{open}: {depth}");
+        let run = move || rendered(&shade(&scene(&[&script(depth)]), &Host::new(), &batch(1)).1.into_diagnostics());
+        let thread = std::thread::Builder::new().stack_size(3 << 19).spawn(run).expect("a thread starts");
+        let said = thread.join().expect("three quarters of the usual stack are enough");
+        assert!(said.is_empty(), "{open}: {said}");
+    }
 }
 
 #[test]
@@ -424,4 +442,91 @@ fn floods_are_merged_and_the_order_does_not_matter() {
     let said = rendered(&forward.into_diagnostics());
     assert_eq!(said, rendered(&backward.into_diagnostics()));
     assert!(said.contains("division by zero: 1 / 0") && said.contains("this happened at 100 hits"), "{said}");
+}
+
+#[test]
+fn nesting_has_a_limit() {
+    let body = format!("let x = {}1{}; #{{}}", "(".repeat(80), ")".repeat(80));
+    assert_blamed(&body, "2:43", &["this is nested more than 64 levels deep", "give parts of it a name with `let`"]);
+}
+
+/// Whatever a script does, it ends in an error or a value, and nothing panics.
+#[test]
+fn hostile_scripts_end() {
+    for body in [
+        "let a = []; loop { a = [a]; }",
+        "let a = [1]; loop { a.push(a); }",
+        "let m = #{}; loop { m = #{ m: m }; }",
+        "let m = #{}; loop { m.again = m; }",
+        "let m = #{}; let a = []; loop { m = #{ a: a }; a = [m]; }",
+        "let f = helper; loop { f = [f]; }",
+        "let a = [3, 1, 2]; a.sort(helper); a.map(helper); #{}",
+        "for i in 0..9223372036854775807 {}",
+        "for i in range(0.0, 1e30, 1e-30) {}",
+        "for i in range(0, 10, 0) {}",
+        "let a = [1, 2, 3]; a.splice(-9, 99, [4]); a.extract(1..9223372036854775807); a.chop(-1); a.insert(99, 1); #{}",
+        "let a = [1]; a.truncate(-1); a[-9223372036854775808]",
+        "let x = 1 << 9223372036854775807; let y = 1 >> -9223372036854775808; #{ priority: x + y }",
+        "let x = -9223372036854775808; #{ priority: abs(x) + -x }",
+        "let x = 10 ** 100; #{}",
+        "let x = 10 ** -1; #{}",
+        "hit.light(-9223372036854775808)",
+        "hit.uv[-1] = 3.0; #{}",
+        "this.x = 1; #{}",
+        "let v = hit.uv; v += v.x; v.yx = v; v[1] /= 0; #{ line_width: v.y }",
+        "try { loop {} } catch { #{} }",
+        "try { throw 1 } catch (error) { #{ line_width: error } }",
+        "try { mix(1) } catch (error) { #{ line_width: error } }",
+        "#{ priority: `${hit} ${p} ${hit.uv} ${hit.light(0)}`.len() }",
+        "print(hit); debug(p); #{}",
+        "type_of(hit) + is_def_fn(\"surface\", 2)",
+        "hit",
+        "p",
+        "while true { surface(hit, p) }",
+        "surface(hit, hit)",
+        "let hit = hit; let p = 3; p.x = 1; #{}",
+        "switch hit.depth { 5.0 => #{ line_width: 1 }, 0..10 => #{}, _ => 3 }",
+        "",
+    ] {
+        let script = format!("fn helper(x) {{ x }} fn surface(hit, p) {{ {body} }}");
+        let scene = scene(&[&script]);
+        if let Ok((shaders, _)) = Shaders::compile(&scene, &Host::new()) {
+            let (mut outputs, mut errors) = (OutputBatch::default(), ShadeErrors::default());
+            let mut shading = Shading::new(&scene, &shaders);
+            shading.shade(MaterialId(0), &batch(2), OutputSet::all(), &mut outputs, &mut errors);
+            assert_eq!(outputs.color.len(), 2, "{body}");
+        }
+    }
+}
+
+proptest::proptest! {
+    #![proptest_config(proptest::prelude::ProptestConfig::with_cases(300))]
+
+    /// Text that is hardly a script gives an error with a place inside the text, or runs.
+    #[test]
+    fn any_text_is_taken(
+        words in proptest::collection::vec(proptest::sample::select(vec![
+            "fn", "surface", "(", "hit", ",", "p", ")", "{", "}", "#{", "base_color", ":", "1.0", ";", "let", "x", "=", "if",
+            "else", "for", "in", "0..3", ".", "uv", "[", "]", "+", "-", "**", "\"", "'", "`", "//", "\n", "é", "switch", "=>",
+            "params", "()", "return", "||", "const", "PI", "_", "eval", "import", "@", "?.", "?[", "...", "loop", "break",
+        ]), 0..40)
+    ) {
+        let body = words.join(" ");
+        for script in [body.clone(), format!("fn surface(hit, p) {{ {body} }}")] {
+            let scene = scene(&[&script]);
+            match Shaders::compile(&scene, &Host::new()) {
+                Err(faults) => {
+                    for fault in faults.0 {
+                        let span = fault.span.clone().expect("every error of a script has a place");
+                        proptest::prop_assert!(span.range.end <= script.len() && !fault.render(false).is_empty());
+                    }
+                }
+                Ok((shaders, _)) => {
+                    let (mut outputs, mut errors) = (OutputBatch::default(), ShadeErrors::default());
+                    let mut shading = Shading::new(&scene, &shaders);
+                    shading.shade(MaterialId(0), &batch(1), OutputSet::all(), &mut outputs, &mut errors);
+                }
+            }
+        }
+    }
 }

@@ -1,1 +1,103 @@
-//! TODO
+//! Scene files: TOML in, a filled [`SceneBuilder`] out.
+//!
+//! 1. `document`: the text becomes a tree whose every key and value knows its place.
+//! 2. `overrides`: values of `--set` are put into the tree, with places of their own.
+//! 3. `check`: the tree is held against the JSON schema that is derived from the types of `format`; faulty parts are
+//!    reported and cut out.
+//! 4. `deserialize`: what is left becomes a typed value.
+//! 5. `resolve`: names, paths, units and defaults are resolved into the builder, with the tree at hand for places.
+//!
+//! No step stops at the first fault, nor does a fault stop the steps after it, syntax errors excepted: all that can be
+//! found is told in one go, in the order of the file.
+
+mod check;
+mod deserialize;
+mod document;
+mod expect;
+mod format;
+mod overrides;
+mod resolve;
+mod schema;
+
+use std::path::Path;
+use std::sync::Arc;
+
+use super::SceneBuilder;
+use crate::diag::{Diagnostic, Diagnostics, Source};
+use crate::files::FileStore;
+
+pub use overrides::Override;
+pub use schema::schema;
+
+/// What the command line decides and loading needs to know.
+#[derive(Clone, Debug, Default)]
+pub struct LoadOptions {
+    /// Poses animated models at this frame, of which there are 24 a second. Default: time 0.
+    pub frame: Option<f64>,
+    /// The camera to render with, of the scene file or of one of its models. Default: the scene's first.
+    pub camera: Option<String>,
+}
+
+/// Reads a scene file, or a bare model as a scene, and everything that it names. Warnings come beside the value.
+///
+/// Relative paths are relative to the file, those in `overrides` to the working directory.
+///
+/// # Errors
+/// Everything that is wrong with the file, the overrides and the files it names, warnings included: errors of the
+/// scene file in its order, then those of the overrides, then those of other files or without a place.
+pub fn load(
+    path: &Path,
+    files: &FileStore,
+    overrides: &[Override],
+    options: &LoadOptions,
+) -> Result<(SceneBuilder, Diagnostics), Diagnostics> {
+    let extension = path.extension().map(|extension| extension.to_string_lossy().to_lowercase());
+    let source = match extension.as_deref() {
+        Some("toml") => files.read_text(path)?,
+        Some("gltf" | "glb") => {
+            files.read(path)?;
+            model_scene(path)?
+        }
+        _ => {
+            let fault = Diagnostic::error("this is neither a scene file nor a model").in_file(path);
+            return Err(fault.hint("scene files end in .toml, models in .gltf or .glb").into());
+        }
+    };
+    let mut document = document::parse(&source)?;
+    let mut faults = Diagnostics::default();
+    let schema = schema();
+    for change in overrides {
+        change.place(&mut document, &schema).unwrap_or_else(|fault| faults.push(fault));
+    }
+    check::check(&mut document, &schema, &mut faults);
+    let written = deserialize::from_node(&document).map_err(|fault| {
+        faults.push(fault);
+        std::mem::take(&mut faults)
+    })?;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let context = resolve::Context { files, options, source: &source, folder };
+    let builder = resolve::resolve(&written, &document, context, &mut faults);
+    let sources: Vec<_> = std::iter::once(&source).chain(overrides.iter().map(Override::source)).collect();
+    faults.0.sort_by_key(|fault| {
+        let span = fault.span.as_ref();
+        let file = span.and_then(|span| sources.iter().position(|source| Arc::ptr_eq(source, &span.source)));
+        (file.unwrap_or(sources.len()), span.map_or(0, |span| span.range.start))
+    });
+    if faults.has_errors() { Err(faults) } else { Ok((builder, faults)) }
+}
+
+/// The scene file that a bare model stands for: what a scene file leaves out is framed and lit, and creases draw lines.
+fn model_scene(path: &Path) -> Result<Arc<Source>, Diagnostic> {
+    let bad_name = || Diagnostic::error("the name of this file is not valid text").in_file(path);
+    let file = path.file_name().and_then(|name| name.to_str()).ok_or_else(bad_name)?;
+    let name = path.file_stem().and_then(|name| name.to_str()).ok_or_else(bad_name)?;
+    let quote = |text: &str| serde_json::Value::from(text).to_string();
+    let text = format!(
+        "[render]\nbackground = {{ bottom = [0.83, 0.83, 0.82], top = [0.96, 0.96, 0.97] }}\n\
+         [lines]\nnormal = 50.0\n\
+         [[objects]]\nname = {}\ngltf = {}\n",
+        quote(name),
+        quote(file)
+    );
+    Ok(Source::new(format!("<scene of {}>", path.display()), text))
+}

@@ -70,7 +70,9 @@ pub(super) fn binary(operator: &str, a: &Shape, b: &Shape) -> Option<Shape> {
             _ => None,
         },
         (Shape::Text(a), Shape::Text(b)) if operator == "+" => {
-            let text = a.as_ref().zip(b.as_ref()).map(|(a, b)| Rc::from(format!("{a}{b}")));
+            // What a script can hold at all; without the bound a doubling loop would fill the memory.
+            let fits = |(a, b): &(&Rc<str>, &Rc<str>)| a.len() + b.len() <= crate::shade::host::MAX_TEXT;
+            let text = a.as_ref().zip(b.as_ref()).filter(fits).map(|(a, b)| Rc::from(format!("{a}{b}")));
             Some(Shape::Text(text))
         }
         _ => None,

@@ -37,6 +37,16 @@ impl Operand {
         value.read_lock::<Vec4>().map(|v| Self::Vec4(*v))
     }
 
+    /// The script's value with the given components.
+    pub fn build(width: usize, at: impl Fn(usize) -> f32) -> Dynamic {
+        match width {
+            1 => Dynamic::from_float(at(0)),
+            2 => Dynamic::from(Vec2::new(at(0), at(1))),
+            3 => Dynamic::from(Vec3::new(at(0), at(1), at(2))),
+            _ => Dynamic::from(Vec4::new(at(0), at(1), at(2), at(3))),
+        }
+    }
+
     /// Components: 1 for a number.
     pub fn width(self) -> usize {
         match self {
@@ -112,13 +122,7 @@ pub(super) fn lanewise<const N: usize>(name: &str, arguments: [Dynamic; N], f: i
             _ => return Err(refuse(name, &arguments)),
         }
     }
-    let at = |index| f(operands.map(|operand| operand.lane(index)));
-    Ok(match width {
-        1 => Dynamic::from_float(at(0)),
-        2 => Dynamic::from(Vec2::new(at(0), at(1))),
-        3 => Dynamic::from(Vec3::new(at(0), at(1), at(2))),
-        _ => Dynamic::from(Vec4::new(at(0), at(1), at(2), at(3))),
-    })
+    Ok(Operand::build(width, |index| f(operands.map(|operand| operand.lane(index)))))
 }
 
 /// Registers a function of one argument that works on each component.

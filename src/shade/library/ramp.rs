@@ -5,7 +5,6 @@ use rhai::{Array, Dynamic, Engine};
 use super::Function;
 use super::math::{mix, smoothstep};
 use super::operand::{Operand, Outcome, kind, number};
-use crate::math::{Vec2, Vec3, Vec4};
 use crate::shade::fault::Fault;
 
 pub(super) const FUNCTIONS: &[Function] = &[
@@ -70,13 +69,7 @@ fn ramp(t: f32, stops: &Array, kind: Kind) -> Outcome {
             (stops[i - 1].1, stops[i].1, u)
         }
     };
-    let at = |lane| mix(from.lane(lane), to.lane(lane), u);
-    Ok(match first.1.width() {
-        1 => Dynamic::from_float(at(0)),
-        2 => Dynamic::from(Vec2::new(at(0), at(1))),
-        3 => Dynamic::from(Vec3::new(at(0), at(1), at(2))),
-        _ => Dynamic::from(Vec4::new(at(0), at(1), at(2), at(3))),
-    })
+    Ok(Operand::build(first.1.width(), |lane| mix(from.lane(lane), to.lane(lane), u)))
 }
 
 fn stop(value: &Dynamic) -> Outcome<(f32, Operand)> {

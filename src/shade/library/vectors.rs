@@ -81,6 +81,11 @@ pub(super) fn normalize<V: Vector>(v: V) -> V {
     if length == 0.0 { V::from_fn(|_| 0.0) } else { V::from_fn(|i| v.get(i) / length) }
 }
 
+/// For x, and likewise for y and z with the letters moved on: `a.y * b.z - b.y * a.z`.
+fn cross(a: Vec3, b: Vec3) -> Vec3 {
+    Vec3::new(a.y * b.z - b.y * a.z, a.z * b.x - b.z * a.x, a.x * b.y - b.x * a.y)
+}
+
 /// `i - n * (2 * dot(n, i))`.
 fn reflect<V: Vector>(i: V, n: V) -> V {
     let twice = 2.0 * dot(n, i);
@@ -102,7 +107,7 @@ pub(super) fn register(engine: &mut Engine) {
     register_kind::<Vec2>(engine);
     register_kind::<Vec3>(engine);
     register_kind::<Vec4>(engine);
-    engine.register_fn("cross", |a: Vec3, b: Vec3| a.cross(b));
+    engine.register_fn("cross", cross);
     engine.register_fn("vec2", |x: f32, y: f32| Vec2::new(x, y));
     engine.register_fn("vec3", |x: f32, y: f32, z: f32| Vec3::new(x, y, z));
     engine.register_fn("vec3", |x: f32| Vec3::splat(x));

@@ -1,0 +1,229 @@
+//! Arguments as typed. What they mean together is worked out by each command.
+
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+
+use crate::line::Method;
+use crate::sample::PixelRect;
+
+/// Draws feature lines of ray-traced scenes, styled by Rhai scripts.
+#[derive(Debug, Parser)]
+#[command(
+    name = "tusche",
+    version,
+    max_term_width = 100,
+    after_help = "Start here:\n  \
+        tusche render scenes/hello.toml -o hello.png    a small scene\n  \
+        tusche render model.glb                         any glTF model, framed and lit\n  \
+        tusche explain scenes/hello.toml                what a render would do, and why\n\n\
+        Exit codes: 0 done, 1 the scene, a shader or a file failed, 2 bad usage."
+)]
+pub struct Arguments {
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Renders a scene file or a model into pictures.
+    Render(Box<RenderArguments>),
+    /// Prints what a render would do, with reasons, without making a pixel.
+    Explain(Box<ExplainArguments>),
+    /// Compares two pictures; exits with 1 if they differ by more than the tolerance.
+    Compare(CompareArguments),
+    /// Prints the JSON schema of scene files, for editors.
+    Schema,
+    /// Prints a completion script for a shell.
+    Completions {
+        /// The shell.
+        shell: clap_complete::Shell,
+    },
+}
+
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  \
+    tusche render scene.toml -o picture.png -o layers.exr\n  \
+    tusche render model.glb --size 1920x1080 --samples 64\n  \
+    tusche render scene.toml --set lines.width=4 --set materials.ink.params.color=[1,0,0]\n  \
+    tusche render walk.glb --frames 1-48 -o walk.####.png")]
+pub struct RenderArguments {
+    #[command(flatten)]
+    pub scene: SceneArguments,
+    /// Renders frames A to B, each into its own files: the names given with -o must hold a run of `#` for the number.
+    #[arg(long, value_name = "A-B", conflicts_with = "frame")]
+    pub frames: Option<FrameRange>,
+    /// Renders these pixels only, x from X0 to below X1 and y from Y0 (top) to below Y1. They come out as in the whole
+    /// picture.
+    #[arg(long, value_name = "X0,Y0,X1,Y1")]
+    pub crop: Option<Crop>,
+    /// How many threads render [default: one for each core].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub threads: Option<u16>,
+    /// Side of a tile in pixels; changes memory and speed, never the picture.
+    #[arg(long, value_name = "N", default_value_t = 32, value_parser = clap::value_parser!(u32).range(1..=4096))]
+    pub tile: u32,
+    /// Writes what the picture cost as JSON.
+    #[arg(long, value_name = "FILE.json")]
+    pub stats: Option<PathBuf>,
+    /// Exits with 0 even if a script failed at some hits.
+    #[arg(long)]
+    pub keep_going: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct ExplainArguments {
+    #[command(flatten)]
+    pub scene: SceneArguments,
+}
+
+/// What decides the picture itself.
+#[derive(Debug, Args)]
+pub struct SceneArguments {
+    /// A scene file (.toml), or a model (.gltf, .glb) to render as it is.
+    #[arg(value_name = "SCENE")]
+    pub scene: PathBuf,
+    /// Where to write: a .png shows one layer, an .exr holds all; may be given more than once
+    /// [default: the scene's name with .png, in the current folder].
+    #[arg(short, long, value_name = "FILE")]
+    pub output: Vec<PathBuf>,
+    /// Size of the picture in pixels.
+    #[arg(long, value_name = "WxH")]
+    pub size: Option<Size>,
+    /// Samples per pixel.
+    #[arg(long, value_name = "N")]
+    pub samples: Option<u32>,
+    /// A sample rate by name, where --samples gives none: 4, 16 or 64.
+    #[arg(long, value_name = "Q", conflicts_with = "samples")]
+    pub quality: Option<Quality>,
+    /// Chooses the sample positions.
+    #[arg(long, value_name = "N")]
+    pub seed: Option<u64>,
+    /// Renders through the camera of this name.
+    #[arg(long, value_name = "NAME")]
+    pub camera: Option<String>,
+    /// Poses animated models at this frame (24 a second).
+    #[arg(long, value_name = "F", allow_negative_numbers = true)]
+    pub frame: Option<f64>,
+    /// Changes a value of the scene file, for example lines.width=3; may be given more than once.
+    #[arg(long, value_name = "PATH=VALUE")]
+    pub set: Vec<String>,
+    /// Writes this layer: rgba, color, line, line.TYPE, Z, N, P, uv, object, feature, aov_NAME. A .png shows the first;
+    /// an .exr holds exactly these [default: rgba; all but line.TYPE].
+    #[arg(long, value_name = "NAME")]
+    pub layer: Vec<String>,
+    /// How lines are found: `exact` is fast, `brute` tries every pair and gives the same picture.
+    #[arg(long, value_name = "HOW", default_value = "exact")]
+    pub lines: LineMode,
+    /// Says nothing but errors.
+    #[arg(short, long)]
+    pub quiet: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct CompareArguments {
+    /// The expected picture (.png or .exr).
+    #[arg(value_name = "A")]
+    pub expected: PathBuf,
+    /// The actual picture.
+    #[arg(value_name = "B")]
+    pub actual: PathBuf,
+    /// The largest difference of any channel of any pixel that still counts as equal.
+    #[arg(long, value_name = "D", default_value_t = 0.0)]
+    pub tolerance: f64,
+    /// Prints the figures as JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum LineMode {
+    Off,
+    Exact,
+    Brute,
+}
+
+impl LineMode {
+    pub fn method(self) -> Method {
+        if self == Self::Brute { Method::Brute } else { Method::Exact }
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Quality {
+    Draft,
+    Preview,
+    Final,
+}
+
+impl Quality {
+    pub fn samples(self) -> u32 {
+        match self {
+            Self::Draft => 4,
+            Self::Preview => 16,
+            Self::Final => 64,
+        }
+    }
+}
+
+/// `WxH`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Size(pub [u32; 2]);
+
+impl FromStr for Size {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (width, height) = text.split_once(['x', 'X']).ok_or("write it as WIDTHxHEIGHT, for example 1280x720")?;
+        let number = |text: &str| text.parse::<u32>().map_err(|_| format!("`{text}` is not a number of pixels"));
+        let size = [number(width)?, number(height)?];
+        if size.contains(&0) {
+            return Err("a picture has at least one pixel each way".into());
+        }
+        Ok(Self(size))
+    }
+}
+
+/// `X0,Y0,X1,Y1`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Crop(pub PixelRect);
+
+impl FromStr for Crop {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let numbers: Vec<i32> = text
+            .split(',')
+            .map(|part| part.trim().parse::<i32>().map_err(|_| format!("`{part}` is not a whole number")))
+            .collect::<Result<_, _>>()?;
+        let [x0, y0, x1, y1] = numbers[..] else {
+            return Err("write it as X0,Y0,X1,Y1, for example 0,0,640,360".into());
+        };
+        if x0 < 0 || y0 < 0 || x1 <= x0 || y1 <= y0 {
+            return Err("X0 and Y0 must be 0 or more, X1 above X0, and Y1 above Y0".into());
+        }
+        Ok(Self(PixelRect { x0, y0, x1, y1 }))
+    }
+}
+
+/// `A-B`, both included.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FrameRange {
+    pub first: u32,
+    pub last: u32,
+}
+
+impl FromStr for FrameRange {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (first, last) = text.split_once('-').ok_or("write it as A-B, for example 1-48")?;
+        let number = |text: &str| text.trim().parse::<u32>().map_err(|_| format!("`{text}` is not a frame number"));
+        let (first, last) = (number(first)?, number(last)?);
+        if last < first {
+            return Err(format!("the last frame, {last}, comes before the first, {first}"));
+        }
+        Ok(Self { first, last })
+    }
+}

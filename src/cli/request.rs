@@ -1,0 +1,117 @@
+//! Arguments as meant: the scene, its shaders and its plan.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use super::args::{LineMode, SceneArguments, Size};
+use super::{Failure, terminal};
+use crate::diag::{Diagnostic, Diagnostics};
+use crate::files::FileStore;
+use crate::film::Layer;
+use crate::plan::Plan;
+use crate::render::{PictureFile, layers_of};
+use crate::scene::{Scene, SceneBuilder, file};
+use crate::shade::{Host, OutputSet, Shaders};
+
+/// The picture that the arguments ask for, ready to be rendered.
+pub(super) struct Request {
+    pub scene: Scene,
+    pub shaders: Shaders,
+    pub plan: Plan,
+    /// The pictures to write.
+    pub files: Vec<PictureFile>,
+    /// Seconds spent on getting here.
+    pub load_seconds: f64,
+}
+
+impl Request {
+    /// Loads, resolves and compiles everything; warnings are printed unless `--quiet`.
+    pub fn new(arguments: &SceneArguments, frame: Option<f64>, outputs: &[PathBuf]) -> Result<Self, Failure> {
+        let start = Instant::now();
+        let files = FileStore::new();
+        let (builder, mut warnings) = load(arguments, frame, &files)?;
+        let scene = builder.build()?;
+        let (shaders, more) = Shaders::compile(&scene, &Host::new())?;
+        warnings.extend(more);
+        if !arguments.quiet {
+            terminal::say(&warnings);
+        }
+        let files = outputs
+            .iter()
+            .map(|path| Ok(PictureFile { path: path.clone(), layers: layers_for(path, &arguments.layer, &shaders)? }))
+            .collect::<Result<Vec<_>, Diagnostic>>()?;
+        let plan = Plan::new(&scene, &shaders, &layers_of(&files));
+        Ok(Self { scene, shaders, plan, files, load_seconds: start.elapsed().as_secs_f64() })
+    }
+}
+
+/// Where to write: what `-o` says, else the scene's name with `.png` in the current folder.
+pub(super) fn output_paths(arguments: &SceneArguments) -> Result<Vec<PathBuf>, Failure> {
+    if arguments.output.is_empty() {
+        let stem = arguments.scene.file_stem().unwrap_or("picture".as_ref());
+        return Ok(vec![Path::new(stem).with_extension("png")]);
+    }
+    for (index, path) in arguments.output.iter().enumerate() {
+        if arguments.output[..index].contains(path) {
+            return Err(Failure::Usage(format!("`{}` is given twice as output", path.display())));
+        }
+    }
+    Ok(arguments.output.clone())
+}
+
+fn load(
+    arguments: &SceneArguments,
+    frame: Option<f64>,
+    files: &FileStore,
+) -> Result<(SceneBuilder, Diagnostics), Failure> {
+    // Flags that stand for values of the scene file go the same way as `--set`, so that they are checked the same way.
+    let mut changes = arguments.set.clone();
+    if let Some(Size([width, height])) = arguments.size {
+        changes.push(format!("render.size=[{width}, {height}]"));
+    }
+    if let Some(samples) = arguments.samples.or(arguments.quality.map(|quality| quality.samples())) {
+        changes.push(format!("render.samples={samples}"));
+    }
+    if let Some(seed) = arguments.seed {
+        changes.push(format!("render.seed={seed}"));
+    }
+    let mut faults = Diagnostics::default();
+    let parsed =
+        changes.iter().filter_map(|text| file::Override::parse(text).map_err(|fault| faults.extend(fault)).ok());
+    let overrides: Vec<_> = parsed.collect();
+    if faults.has_errors() {
+        return Err(faults.into());
+    }
+    let options = file::LoadOptions { frame, camera: arguments.camera.clone() };
+    let (mut builder, warnings) = file::load(&arguments.scene, files, &overrides, &options)?;
+    builder.lines.enabled &= arguments.lines != LineMode::Off;
+    Ok((builder, warnings))
+}
+
+/// The layers of an output: those asked for, or a PNG's `rgba` and everything but `line.TYPE` for an EXR.
+fn layers_for(path: &Path, asked: &[String], shaders: &Shaders) -> Result<Vec<Layer>, Diagnostic> {
+    let is_exr = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("exr"));
+    let aovs = shaders.aovs();
+    if !asked.is_empty() {
+        let shown = if is_exr { asked } else { &asked[..1] };
+        return shown.iter().map(|name| Layer::parse(name, aovs)).collect();
+    }
+    if !is_exr {
+        return Ok(vec![Layer::Rgba]);
+    }
+    let mut layers = vec![
+        Layer::Rgba,
+        Layer::Color,
+        Layer::Line,
+        Layer::Depth,
+        Layer::Normal,
+        Layer::Position,
+        Layer::Uv,
+        Layer::Object,
+    ];
+    if shaders.iter().any(|shader| shader.analysis().output(OutputSet::FEATURE).may) {
+        layers.push(Layer::Feature);
+    }
+    layers.extend(aovs.iter().enumerate().map(|(index, name)| Layer::Aov(index, name.clone())));
+    Ok(layers)
+}

@@ -1,0 +1,59 @@
+//! How a seen line colours its sample (DESIGN sections 3.2 and 3.3; OG18 sections 3.4 and 3.5).
+
+use super::differ::Fired;
+use super::pair::Found;
+use super::window::{PathTile, PathWindow, features};
+use super::{LineType, Rules, SeenLine};
+use crate::math::{Vec3, luminance};
+use crate::scene::settings::Composition;
+
+impl LineType {
+    /// The strongest reason that a line has; `None` without any.
+    #[must_use]
+    pub fn of(fired: Fired) -> Option<Self> {
+        [
+            (Fired::MISS, Self::Outline),
+            (Fired::OBJECT, Self::Silhouette),
+            (Fired::SHADER, Self::Material),
+            (Fired::NORMAL, Self::Crease),
+            (Fired::UV, Self::Uv),
+            (Fired::FEATURE, Self::Feature),
+        ]
+        .into_iter()
+        .find_map(|(test, kind)| fired.contains(test).then_some(kind))
+    }
+}
+
+/// The line that a target sees, in its colours.
+pub(super) fn style(window: &PathWindow<'_>, targets: &PathTile<'_>, found: &Found, rules: &Rules) -> Option<SeenLine> {
+    let pair = &found.pair;
+    let neighbors = window.tiles[pair.tile].as_ref()?;
+    let (styling, row) = if pair.own { (targets.nodes, found.row) } else { (neighbors.nodes, pair.row) };
+    let line_color = Vec3::from(styling.line_color.get(row));
+    let alpha = rules.alpha(styling.line_width.get(row));
+
+    let sample = targets.nodes.sample[found.row];
+    let before = Vec3::from(targets.buffer.color[sample as usize].color);
+    // The target's: it is the target's colour that the line replaces.
+    let throughput = Vec3::from(targets.nodes.throughput.get(found.row));
+    let settings = rules.settings();
+    let color = if settings.tint { line_color * throughput } else { line_color };
+    let lined = match settings.compose {
+        Composition::Replace => before * (1.0 - alpha) + color * alpha,
+        Composition::Throughput => {
+            let part = if settings.tint { color } else { line_color * luminance(throughput) };
+            before + (part - Vec3::from(targets.nodes.contribution.get(found.row))) * alpha
+        }
+    };
+
+    let spp = neighbors.buffer.samples_per_pixel;
+    Some(SeenLine {
+        color: color.to_array(),
+        alpha,
+        lined: lined.to_array(),
+        path: found.path,
+        fired: rules.tests().fired(&features(targets.nodes, found.row), &features(neighbors.nodes, pair.row)),
+        neighbor: (pair.pixel, neighbors.nodes.sample[pair.row] % spp),
+        own: pair.own,
+    })
+}

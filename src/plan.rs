@@ -1,0 +1,425 @@
+//! The plan: what this scene calls for, derived once and obeyed by every later stage (DESIGN section 5).
+//!
+//! Its `Display` is what `tusche explain` prints; the golden texts beside the shipped scenes hold it still.
+
+use std::fmt;
+
+use crate::film::{Filter, Layer};
+use crate::line::Rules;
+use crate::sample::{NodeColumnSet, SampleLayout};
+use crate::scene::Scene;
+use crate::scene::ids::MaterialId;
+use crate::scene::settings::{Background, FilterKind, LineSettings, RayKinds};
+use crate::shade::analysis::OutputFact;
+use crate::shade::bsdf::MIRROR_ROUGHNESS;
+use crate::shade::{Analysis, InputSet, Mode, OutputSet, Shader, Shaders};
+
+/// What rendering does with the hits of one material.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MaterialPlan {
+    /// Outputs that are evaluated.
+    pub wanted: OutputSet,
+    /// Inputs that are gathered.
+    pub inputs: InputSet,
+    /// How the shader is run.
+    pub mode: Mode,
+    /// Whether lights can reach the eye by scattering here.
+    pub lit: bool,
+    /// Whether light samples are taken here, for the BSDF or for the script.
+    pub lights: bool,
+    /// Whether rays may be mirrored here.
+    pub reflects: bool,
+    /// Whether rays may be refracted here.
+    pub refracts: bool,
+    /// Whether rays may go straight on here because the surface is not fully opaque.
+    pub see_through: bool,
+    /// Whether any object uses it.
+    used: bool,
+}
+
+impl MaterialPlan {
+    /// Whether a shadow ray surely ends here.
+    #[must_use]
+    pub fn blocks_light(&self) -> bool {
+        !self.refracts && !self.see_through
+    }
+}
+
+/// The line pass, if there is one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LinePlan {
+    /// The rules, with the widest line that can occur worked out.
+    pub rules: Rules,
+    /// The widest line that can occur, in pixels.
+    pub widest: f32,
+    /// How far lines reach, in whole pixels: the border of samples that a tile needs around it.
+    pub reach: i32,
+}
+
+/// What this scene calls for.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    /// By material.
+    pub materials: Vec<MaterialPlan>,
+    /// Whether any layer shows colours; if not, nothing is lit.
+    pub color: bool,
+    /// Most mirror reflections along a path; 0 if nothing mirrors.
+    pub reflection_depth: u32,
+    /// Most refractions along a path; 0 if nothing is transparent.
+    pub refraction_depth: u32,
+    /// Whether shadow rays are traced.
+    pub shadow_rays: bool,
+    /// The line pass; `None` if no line can be seen.
+    pub lines: Option<LinePlan>,
+    /// What samples keep.
+    pub layout: SampleLayout,
+    /// The layers that are developed.
+    pub layers: Vec<Layer>,
+    /// The pixel filter.
+    pub filter: Filter,
+    explanation: String,
+}
+
+impl Plan {
+    /// Derives the plan of a scene for the layers that will be written.
+    #[must_use]
+    pub fn new(scene: &Scene, shaders: &Shaders, layers: &[Layer]) -> Self {
+        let settings = scene.render();
+        let color = layers.iter().any(|layer| matches!(layer, Layer::Rgba | Layer::Color | Layer::Aov(..)));
+        let used = used_materials(scene);
+        let tests = scene.lines();
+        let wants_feature = tests.feature.is_some() || layers.contains(&Layer::Feature);
+
+        let lights = !scene.lights().is_empty();
+        let mut materials: Vec<MaterialPlan> =
+            shaders.iter().zip(&used).map(|(shader, used)| plan_material(shader, lights, color, *used)).collect();
+        let any = |what: fn(&MaterialPlan) -> bool| materials.iter().any(|m| m.used && what(m));
+        let reflects = any(|m| m.reflects);
+        let passes = any(|m| m.refracts || m.see_through);
+        let reflection_depth = if reflects { settings.reflection_depth } else { 0 };
+        let refraction_depth = if passes { settings.refraction_depth } else { 0 };
+
+        let lines = plan_lines(scene, shaders, layers, &used);
+        for (material, shader) in materials.iter_mut().zip(shaders.iter()) {
+            let may = may_write(shader.analysis());
+            if lines.is_some() {
+                material.wanted |= may & (OutputSet::LINE_COLOR | OutputSet::LINE_WIDTH | OutputSet::PRIORITY);
+            }
+            if wants_feature && (lines.is_some() || layers.contains(&Layer::Feature)) {
+                material.wanted |= may & OutputSet::FEATURE;
+            }
+        }
+
+        let secondary = reflection_depth + refraction_depth > 0;
+        let line_paths = lines.is_some() && secondary;
+        let throughput_composition = tests.compose == crate::scene::settings::Composition::Throughput;
+        let columns = NodeColumnSet {
+            uv: (lines.is_some() && tests.uv.is_some()) || layers.contains(&Layer::Uv),
+            normal: (lines.is_some() && tests.normal.is_some()) || layers.contains(&Layer::Normal),
+            feature: (lines.is_some() && tests.feature.is_some()) || layers.contains(&Layer::Feature),
+            lines: lines.is_some(),
+            throughput: line_paths && (tests.tint || throughput_composition),
+            contribution: lines.is_some() && throughput_composition,
+        };
+        let has_aovs = layers.iter().any(|layer| matches!(layer, Layer::Aov(..)));
+        let aovs = if has_aovs { shaders.aovs().len() } else { 0 };
+        let layout = SampleLayout {
+            samples_per_pixel: settings.samples,
+            columns,
+            position: layers.contains(&Layer::Position),
+            aovs,
+            max_width: tests.max_width,
+            materials: materials.len(),
+        };
+        let shadow_rays = materials.iter().any(|m| m.used && m.lights) && scene.lights().iter().any(|l| l.shadows);
+        let mut plan = Self {
+            materials,
+            color,
+            reflection_depth,
+            refraction_depth,
+            shadow_rays,
+            lines,
+            layout,
+            layers: layers.to_vec(),
+            filter: Filter::new(settings.filter, settings.filter_radius),
+            explanation: String::new(),
+        };
+        plan.explanation = explain(&plan, scene, shaders);
+        plan
+    }
+
+    /// Whether any ray but those of the camera may be traced along a path.
+    #[must_use]
+    pub fn has_secondary_rays(&self) -> bool {
+        self.reflection_depth + self.refraction_depth > 0
+    }
+}
+
+fn used_materials(scene: &Scene) -> Vec<bool> {
+    let mut used = vec![false; scene.materials().len()];
+    for object in scene.objects() {
+        for slot in &object.materials {
+            used[slot.index()] = true;
+        }
+    }
+    used
+}
+
+fn may_write(analysis: &Analysis) -> OutputSet {
+    OutputSet::all().iter().filter(|output| analysis.output(*output).may).collect()
+}
+
+/// Least and greatest value an output can have, with its default where the script may leave it out; `None` if unknown.
+fn bounds(fact: &OutputFact, default: f32) -> Option<[f32; 2]> {
+    if !fact.may {
+        return Some([default; 2]);
+    }
+    let [low, high] = fact.range?;
+    Some(if fact.always { [low, high] } else { [low.min(default), high.max(default)] })
+}
+
+fn plan_material(shader: &Shader, lights: bool, color: bool, used: bool) -> MaterialPlan {
+    let analysis = shader.analysis();
+    let least = |output, default| bounds(analysis.output(output), default).map_or(f32::NEG_INFINITY, |b| b[0]);
+    let greatest = |output, default| bounds(analysis.output(output), default).map_or(f32::INFINITY, |b| b[1]);
+    let bypass = analysis.output(OutputSet::COLOR).always;
+
+    let may_be_smooth = least(OutputSet::ROUGHNESS, 1.0) <= MIRROR_ROUGHNESS;
+    let may_be_rough = greatest(OutputSet::ROUGHNESS, 1.0) > MIRROR_ROUGHNESS;
+    let metallic = greatest(OutputSet::METALLIC, 0.0) > 0.0;
+    let shiny = greatest(OutputSet::SPECULAR, 1.0) > 0.0 || metallic;
+    let refracts = !bypass && greatest(OutputSet::TRANSMISSION, 0.0) > 0.0;
+    let reflects = !bypass && ((may_be_smooth && shiny) || refracts);
+    let see_through = least(OutputSet::OPACITY, 1.0) < 1.0;
+    let diffuse = greatest(OutputSet::BASE_COLOR, 0.8) > 0.0
+        && least(OutputSet::METALLIC, 0.0) < 1.0
+        && least(OutputSet::TRANSMISSION, 0.0) < 1.0;
+    let lit = !bypass && color && lights && (diffuse || (may_be_rough && shiny));
+
+    // Rays depend on these even where no layer shows the colour.
+    let mut wanted = OutputSet::OPACITY;
+    if reflects || refracts {
+        wanted |= OutputSet::BSDF | OutputSet::COLOR;
+    }
+    if color {
+        wanted |= OutputSet::BSDF | OutputSet::COLOR;
+    }
+    MaterialPlan {
+        wanted: wanted & may_write(analysis),
+        inputs: shader.needs(),
+        mode: shader.mode(),
+        lit,
+        lights: lights && (lit || analysis.inputs.intersects(InputSet::LIGHTS)),
+        reflects,
+        refracts,
+        see_through,
+        used,
+    }
+}
+
+fn plan_lines(scene: &Scene, shaders: &Shaders, layers: &[Layer], used: &[bool]) -> Option<LinePlan> {
+    let settings = scene.lines();
+    let shown = layers.iter().any(|l| matches!(l, Layer::Rgba | Layer::Line | Layer::LineType(_)));
+    let tested = settings.object
+        || settings.shader
+        || settings.uv.is_some()
+        || settings.normal.is_some()
+        || settings.feature.is_some();
+    if !settings.enabled || !shown || !tested || settings.paths.is_empty() {
+        return None;
+    }
+    let mut draws = vec![false; used.len()];
+    for object in scene.objects().iter().filter(|object| object.lines) {
+        for slot in &object.materials {
+            draws[slot.index()] = true;
+        }
+    }
+    let widest = draws
+        .iter()
+        .enumerate()
+        .filter(|(_, draws)| **draws)
+        .map(|(index, _)| {
+            let fact = shaders.of(MaterialId::from_index(index)).analysis().output(OutputSet::LINE_WIDTH);
+            bounds(fact, settings.width).map_or(settings.max_width, |b| b[1]).min(settings.max_width)
+        })
+        .fold(0.0, f32::max);
+    if widest <= 0.0 {
+        return None;
+    }
+    let rules = Rules::new(settings, scene.render().samples).with_widest(widest);
+    let reach = rules.reach();
+    Some(LinePlan { rules, widest, reach })
+}
+
+fn explain(plan: &Plan, scene: &Scene, shaders: &Shaders) -> String {
+    let mut text = String::new();
+    let mut row = |name: &str, value: String| {
+        text.push_str(&format!("{name:<16}{value}\n"));
+    };
+    let settings = scene.render();
+    let [width, height] = settings.size;
+    row("picture", format!("{width} x {height}, {} samples per pixel", settings.samples));
+    row("filter", format!("{}, radius {} px", filter_name(settings.filter), settings.filter_radius));
+    row("objects", format!("{} over {} triangles", scene.objects().len(), scene.triangle_count()));
+    row("background", background_name(&settings.background).into());
+
+    let names = |what: fn(&MaterialPlan) -> bool| {
+        let all: Vec<_> = plan
+            .materials
+            .iter()
+            .enumerate()
+            .filter(|(_, m)| m.used && what(m))
+            .map(|(index, _)| scene.materials()[index].name.as_str())
+            .collect();
+        shorten(&all)
+    };
+    row(
+        "reflection rays",
+        match plan.reflection_depth {
+            0 if settings.reflection_depth == 0 => "none: reflection_depth is 0".into(),
+            0 => "none: nothing mirrors".into(),
+            depth => format!("to depth {depth}: {}", names(|m| m.reflects)),
+        },
+    );
+    row(
+        "refraction rays",
+        match plan.refraction_depth {
+            0 if settings.refraction_depth == 0 => "none: refraction_depth is 0".into(),
+            0 => "none: nothing is transparent".into(),
+            depth => format!("to depth {depth}: {}", names(|m| m.refracts || m.see_through)),
+        },
+    );
+    row(
+        "shadow rays",
+        if plan.shadow_rays {
+            let lights: Vec<_> =
+                scene.lights().iter().filter(|light| light.shadows).map(|light| light.name.as_str()).collect();
+            format!("to {}; asked for by {}", shorten(&lights), names(|m| m.lights))
+        } else if scene.lights().is_empty() {
+            "none: there are no lights".into()
+        } else if !scene.lights().iter().any(|light| light.shadows) {
+            "none: no light casts shadows".into()
+        } else {
+            "none: nothing reads light and nothing is lit".into()
+        },
+    );
+    row("lines", explain_lines(plan, scene.lines()));
+    row("strata", "1: no lens, no shutter, no rough mirror".into());
+    row("surfaces", "1".into());
+    row("columns", columns(plan).join(" "));
+    row("layers", plan.layers.iter().map(ToString::to_string).collect::<Vec<_>>().join(" "));
+    for (index, material) in plan.materials.iter().enumerate().filter(|(_, m)| m.used) {
+        let shader = shaders.of(MaterialId::from_index(index));
+        let reads = if shader.analysis().complete {
+            flag_names(material.inputs.iter_names().map(|(name, _)| name))
+        } else {
+            "anything".into()
+        };
+        row(
+            "material",
+            format!(
+                "{} ({}): {}; reads {}; evaluates {}",
+                scene.materials()[index].name,
+                short_script_name(&scene.scripts()[scene.materials()[index].script.index()].source.name),
+                material.mode.name(),
+                if reads.is_empty() { "nothing".into() } else { reads },
+                match flag_names(material.wanted.iter_names().map(|(name, _)| name)) {
+                    none if none.is_empty() => "nothing".into(),
+                    some => some,
+                },
+            ),
+        );
+    }
+    text
+}
+
+fn explain_lines(plan: &Plan, settings: &LineSettings) -> String {
+    let Some(lines) = &plan.lines else {
+        return if settings.enabled { "none: no line can be seen" } else { "none: switched off" }.into();
+    };
+    let mut tests = Vec::new();
+    tests.extend(settings.object.then(|| "object".to_owned()));
+    tests.extend(settings.shader.then(|| "shader".to_owned()));
+    tests.extend(settings.uv.map(|t| format!("uv > {t}")));
+    tests.extend(settings.normal.map(|t| format!("normal > {t} degrees")));
+    tests.extend(settings.feature.map(|t| format!("feature > {t}")));
+    let mut paths = vec!["camera"];
+    paths.retain(|_| settings.paths.contains(RayKinds::CAMERA));
+    if plan.reflection_depth > 0 && settings.paths.contains(RayKinds::REFLECTION) {
+        paths.push("reflection");
+    }
+    if plan.refraction_depth > 0 && settings.paths.contains(RayKinds::REFRACTION) {
+        paths.push("refraction");
+    }
+    format!(
+        "where {} differ; seen by {}; at most {} px wide, so tiles need {} px around them",
+        tests.join(", "),
+        paths.join(", "),
+        lines.widest,
+        lines.reach
+    )
+}
+
+fn columns(plan: &Plan) -> Vec<&'static str> {
+    let set = plan.layout.columns;
+    let keeps_depth = plan.lines.is_some() || plan.layers.contains(&Layer::Depth);
+    [
+        (true, "color"),
+        (true, "object"),
+        (true, "shader"),
+        (set.uv, "uv"),
+        (set.normal, "normal"),
+        (set.feature, "feature"),
+        (keeps_depth, "depth"),
+        (set.lines, "line_color line_width priority"),
+        (set.throughput, "throughput"),
+        (set.contribution, "contribution"),
+        (plan.layout.position, "position"),
+        (plan.layout.aovs > 0, "aovs"),
+    ]
+    .into_iter()
+    .filter_map(|(kept, name)| kept.then_some(name))
+    .collect()
+}
+
+fn flag_names<'a>(names: impl Iterator<Item = &'a str>) -> String {
+    names.map(str::to_lowercase).collect::<Vec<_>>().join(" ")
+}
+
+/// Up to four names, and how many more there are.
+fn shorten(names: &[&str]) -> String {
+    match names {
+        few if few.len() <= 4 => few.join(", "),
+        many => format!("{} and {} more", many[..3].join(", "), many.len() - 3),
+    }
+}
+
+/// The last part of a script's path: the same text wherever the scene lies.
+fn short_script_name(name: &str) -> &str {
+    name.rsplit(['/', '\\']).next().unwrap_or(name)
+}
+
+fn filter_name(kind: FilterKind) -> &'static str {
+    match kind {
+        FilterKind::Box => "box",
+        FilterKind::Tent => "tent",
+        FilterKind::Gaussian => "gaussian",
+        FilterKind::Mitchell => "mitchell",
+        FilterKind::BlackmanHarris => "blackman-harris",
+    }
+}
+
+fn background_name(background: &Background) -> &'static str {
+    match background {
+        Background::Transparent => "transparent",
+        Background::Color(_) => "one colour",
+        Background::Gradient { .. } => "gradient",
+        Background::Image { .. } => "image",
+    }
+}
+
+impl fmt::Display for Plan {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.explanation)
+    }
+}

@@ -1,0 +1,401 @@
+//! The driver: tiles through tracing, the line pass and the film, strip by strip.
+//!
+//! A strip's lines need the samples of the strips beside it, and its pixels need their lines. So each step of the loop
+//! samples one strip, finds the lines of an earlier one, and develops one earlier still; all tiles of a step are
+//! independent of each other and run on all threads. Strips that nothing needs any more are dropped: no sample is
+//! rendered twice, and memory grows with the short side of the picture only.
+
+mod files;
+mod grid;
+pub mod stats;
+
+pub use files::{PictureFile, layers_of, render_files};
+
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
+use std::time::Instant;
+
+use rayon::prelude::*;
+
+use crate::diag::{Diagnostic, Diagnostics};
+use crate::film::{FilmTile, FilmWindow, develop};
+use crate::line::{LineBuffer, LineCounts, LineTile, Method, TileBounds, Window, find_lines};
+use crate::plan::Plan;
+use crate::sample::{GateCounts, PixelRect, SampleBuffer};
+use crate::scene::Scene;
+use crate::scene::ids::MaterialId;
+use crate::shade::{Lighting, ShadeErrors, Shaders};
+use crate::trace::wave::TracedTile;
+use crate::trace::{RayCounts, TileTracer, TraceContext, World};
+use grid::Grid;
+use stats::{Lines, Seconds, ShaderStats, Stats};
+
+/// How to render; none of it changes the picture but `crop`, which leaves out parts.
+#[derive(Clone, Debug)]
+pub struct RenderOptions {
+    /// Threads; 0 for as many as the machine has.
+    pub threads: usize,
+    /// Side of a tile in pixels, at least 1.
+    pub tile: u32,
+    /// The pixels to render; `None` for all.
+    pub crop: Option<PixelRect>,
+    /// How lines are searched.
+    pub method: Method,
+}
+
+impl Default for RenderOptions {
+    fn default() -> Self {
+        Self { threads: 0, tile: 32, crop: None, method: Method::Exact }
+    }
+}
+
+/// How a caller follows and stops a render.
+#[derive(Default)]
+pub struct Control<'a> {
+    /// Once true, no new tiles are begun and `render` returns soon with what is done.
+    pub cancel: Option<&'a AtomicBool>,
+    /// Called from any thread with the share of the work that is done, 0 … 1, rising.
+    pub progress: Option<&'a (dyn Fn(f64) + Sync)>,
+}
+
+/// What came of a render, beside its pixels.
+#[derive(Debug)]
+pub struct Report {
+    /// What it cost.
+    pub stats: Stats,
+    /// Run-time errors of scripts, each place once with a count; they mark hits but do not stop the picture.
+    pub script_errors: Diagnostics,
+    /// What the gate stopped, by material.
+    pub warnings: Diagnostics,
+    /// Whether every tile was rendered (false after a cancel).
+    pub complete: bool,
+}
+
+/// Takes finished tiles of the plan's layers: called from any thread, in any order, each pixel once.
+pub type Emit<'a> = &'a (dyn Fn(&FilmTile) -> Result<(), Diagnostic> + Sync);
+
+/// Renders a scene under its plan. Finished tiles of the plan's layers go to `emit`.
+///
+/// # Errors
+/// What `emit` returns, or that no threads could be started.
+pub fn render(
+    scene: &Scene,
+    shaders: &Shaders,
+    plan: &Plan,
+    options: &RenderOptions,
+    control: &Control<'_>,
+    emit: Emit<'_>,
+) -> Result<Report, Diagnostic> {
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(options.threads)
+        .build()
+        .map_err(|error| Diagnostic::error(format!("cannot start rendering threads: {error}")))?;
+    pool.install(|| {
+        let start = Instant::now();
+        let transmissive: Vec<bool> = plan.materials.iter().map(|material| material.refracts).collect();
+        let world = World::new(scene, &transmissive);
+        let lighting = Lighting::new(scene, world.origin);
+        let build = start.elapsed().as_secs_f64();
+        let tracer = TileTracer::new(scene, plan, &world, &lighting);
+        let mut render = Render::new(scene, shaders, plan, options, control, tracer);
+        render.run(emit)?;
+        let mut report = render.report();
+        report.stats.seconds.build = build;
+        report.stats.seconds.total = start.elapsed().as_secs_f64();
+        Ok(report)
+    })
+}
+
+/// The state of a render.
+struct Render<'a> {
+    scene: &'a Scene,
+    shaders: &'a Shaders,
+    plan: &'a Plan,
+    control: &'a Control<'a>,
+    method: Method,
+    tracer: TileTracer<'a>,
+    grid: Grid,
+    crop: PixelRect,
+    /// Scratch memory and script engines, one for each thread that ever needed one.
+    contexts: Mutex<Vec<TraceContext<'a>>>,
+    /// By tile of the grid, while something still needs it.
+    samples: Vec<Option<Box<SampledTile>>>,
+    lines: Vec<Option<Box<LineBuffer>>>,
+    jobs_done: AtomicUsize,
+    totals: Totals,
+    complete: bool,
+}
+
+/// A tile of samples, made ready for the line pass if there is one.
+struct SampledTile {
+    buffer: SampleBuffer,
+    bounds: Option<TileBounds>,
+}
+
+impl SampledTile {
+    fn for_lines(&self) -> Option<LineTile<'_>> {
+        Some(LineTile { buffer: &self.buffer, bounds: self.bounds.as_ref()? })
+    }
+}
+
+/// One tile's turn in one stage.
+enum Job {
+    Sample(usize),
+    Line(usize),
+    Develop(usize),
+}
+
+/// What a job made.
+enum Product {
+    Sampled { tile: usize, traced: Box<TracedTile>, bounds: Option<TileBounds>, line_seconds: f64 },
+    Lined { tile: usize, lines: Box<LineBuffer>, seconds: f64 },
+    Developed { seconds: f64 },
+}
+
+#[derive(Default)]
+struct Totals {
+    seconds: Seconds,
+    rays: RayCounts,
+    lines: LineCounts,
+    samples: u64,
+    bytes: u64,
+    hits: Vec<u64>,
+    shade_seconds: Vec<f64>,
+    /// By material, misses first.
+    gate: Vec<GateCounts>,
+}
+
+impl<'a> Render<'a> {
+    fn new(
+        scene: &'a Scene,
+        shaders: &'a Shaders,
+        plan: &'a Plan,
+        options: &RenderOptions,
+        control: &'a Control<'a>,
+        tracer: TileTracer<'a>,
+    ) -> Self {
+        let picture = PixelRect::of_size(scene.render().size);
+        let crop = options.crop.map_or(picture, |crop| crop.intersection(&picture));
+        let border = plan.lines.as_ref().map_or(0, |lines| lines.reach) + plan.filter.reach();
+        let grid = Grid::new(crop.grown(border).intersection(&picture), options.tile.max(1));
+        let materials = scene.materials().len();
+        Self {
+            scene,
+            shaders,
+            plan,
+            control,
+            method: options.method,
+            tracer,
+            crop,
+            contexts: Mutex::default(),
+            samples: (0..grid.tiles()).map(|_| None).collect(),
+            lines: (0..grid.tiles()).map(|_| None).collect(),
+            jobs_done: AtomicUsize::new(0),
+            totals: Totals {
+                hits: vec![0; materials],
+                shade_seconds: vec![0.0; materials],
+                gate: vec![GateCounts::default(); materials + 1],
+                ..Totals::default()
+            },
+            complete: true,
+            grid,
+        }
+    }
+
+    /// The loop: every step moves each stage on by one strip.
+    fn run(&mut self, emit: Emit<'_>) -> Result<(), Diagnostic> {
+        let strips_of = |pixels: i32| (pixels.max(0) as usize).div_ceil(self.grid.tile as usize);
+        let line_halo = self.plan.lines.as_ref().map_or(0, |lines| strips_of(lines.reach));
+        let film_halo = strips_of(self.plan.filter.reach());
+        let line_lag = 1 + line_halo;
+        let film_lag = if self.plan.lines.is_some() { line_lag } else { 0 } + 1 + film_halo;
+        for step in 0..self.grid.strips() + film_lag {
+            let strip = |lag: usize| step.checked_sub(lag).map_or_else(Vec::new, |strip| self.grid.strip(strip));
+            let mut jobs: Vec<Job> = strip(0).into_iter().map(Job::Sample).collect();
+            if self.plan.lines.is_some() {
+                jobs.extend(strip(line_lag).into_iter().map(Job::Line));
+            }
+            jobs.extend(strip(film_lag).into_iter().map(Job::Develop));
+            let products = jobs.into_par_iter().map(|job| self.work(job, emit)).collect::<Result<Vec<_>, _>>()?;
+            for product in products {
+                match product {
+                    Some(product) => self.take(product),
+                    None => self.complete = false,
+                }
+            }
+            if !self.complete {
+                return Ok(());
+            }
+            // The next step's lines need samples from here on, and its pixels need lines from there on.
+            let still_needed = (step + 1).saturating_sub((line_lag + line_halo).max(film_lag + film_halo));
+            if let Some(done) = still_needed.checked_sub(1) {
+                for tile in self.grid.strip(done) {
+                    self.samples[tile] = None;
+                    self.lines[tile] = None;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn cancelled(&self) -> bool {
+        self.control.cancel.is_some_and(|cancel| cancel.load(Ordering::Relaxed))
+    }
+
+    /// Does a job, on any thread; `None` once cancelled.
+    fn work(&self, job: Job, emit: Emit<'_>) -> Result<Option<Product>, Diagnostic> {
+        if self.cancelled() {
+            return Ok(None);
+        }
+        let start = Instant::now();
+        let product = match job {
+            Job::Sample(tile) => Some(self.sample(tile)),
+            Job::Line(tile) => self.line(tile).map(|lines| {
+                let seconds = start.elapsed().as_secs_f64();
+                Product::Lined { tile, lines: Box::new(lines), seconds }
+            }),
+            Job::Develop(tile) => {
+                let film = self.develop(tile);
+                if film.rect.pixels() > 0 {
+                    emit(&film)?;
+                }
+                Some(Product::Developed { seconds: start.elapsed().as_secs_f64() })
+            }
+        };
+        let done = self.jobs_done.fetch_add(1, Ordering::Relaxed) + 1;
+        if let Some(progress) = self.control.progress {
+            let stages = if self.plan.lines.is_some() { 3 } else { 2 };
+            progress(done as f64 / (stages * self.grid.tiles()) as f64);
+        }
+        Ok(product)
+    }
+
+    fn sample(&self, tile: usize) -> Product {
+        let free = self.contexts.lock().unwrap_or_else(PoisonError::into_inner).pop();
+        let mut context = free.unwrap_or_else(|| TraceContext::new(self.scene, self.shaders));
+        let traced = Box::new(self.tracer.trace(self.grid.rect(tile), &mut context));
+        self.contexts.lock().unwrap_or_else(PoisonError::into_inner).push(context);
+        let start = Instant::now();
+        let bounds = self.plan.lines.as_ref().map(|lines| TileBounds::new(&traced.samples, &lines.rules));
+        Product::Sampled { tile, traced, bounds, line_seconds: start.elapsed().as_secs_f64() }
+    }
+
+    fn line(&self, tile: usize) -> Option<LineBuffer> {
+        let lines = self.plan.lines.as_ref()?;
+        let part = self.grid.around(tile, lines.reach);
+        let tiles = part.tiles.iter().map(|tile| self.samples[*tile].as_ref()?.for_lines()).collect();
+        let window = Window { origin: part.origin, tile: self.grid.tile, columns: part.columns, tiles };
+        let target = self.samples[tile].as_ref()?.for_lines()?;
+        Some(find_lines(&window, target, &lines.rules, self.method))
+    }
+
+    fn develop(&self, tile: usize) -> FilmTile {
+        let part = self.grid.around(tile, self.plan.filter.reach());
+        let of_tile = |tile: &usize| {
+            let samples = self.samples[*tile].as_ref()?;
+            Some((&samples.buffer, self.lines[*tile].as_deref()))
+        };
+        let tiles = part.tiles.iter().map(of_tile).collect();
+        let window = FilmWindow { origin: part.origin, tile: self.grid.tile, columns: part.columns, tiles };
+        let rect = self.grid.rect(tile).intersection(&self.crop);
+        develop(&window, rect, &self.plan.filter, &self.plan.layers)
+    }
+
+    /// Puts a job's product in its place.
+    fn take(&mut self, product: Product) {
+        let totals = &mut self.totals;
+        match product {
+            Product::Sampled { tile, traced, bounds, line_seconds } => {
+                totals.seconds.lines += line_seconds;
+                let TracedTile { samples, rays, hits, shade_seconds, seconds } = *traced;
+                let shading: f64 = shade_seconds.iter().sum();
+                totals.seconds.trace += seconds - shading;
+                totals.seconds.shade += shading;
+                totals.rays += rays;
+                totals.samples += samples.color.len() as u64;
+                totals.bytes += samples.bytes() as u64;
+                totals.hits.iter_mut().zip(&hits).for_each(|(total, hits)| *total += hits);
+                totals.shade_seconds.iter_mut().zip(&shade_seconds).for_each(|(total, seconds)| *total += seconds);
+                totals.gate.iter_mut().zip(&samples.gate).for_each(|(total, gate)| *total += *gate);
+                self.samples[tile] = Some(Box::new(SampledTile { buffer: samples, bounds }));
+            }
+            Product::Lined { tile, lines, seconds } => {
+                totals.seconds.lines += seconds;
+                totals.lines += lines.counts;
+                self.lines[tile] = Some(lines);
+            }
+            Product::Developed { seconds } => totals.seconds.film += seconds,
+        }
+    }
+
+    fn report(self) -> Report {
+        let totals = self.totals;
+        let mut errors = ShadeErrors::default();
+        for context in self.contexts.into_inner().unwrap_or_else(PoisonError::into_inner) {
+            errors.merge(context.errors);
+        }
+        let gate = totals.gate.iter().fold(GateCounts::default(), |mut sum, counts| {
+            sum += *counts;
+            sum
+        });
+        let shaders = self
+            .scene
+            .materials()
+            .iter()
+            .enumerate()
+            .map(|(index, material)| ShaderStats {
+                name: material.name.clone(),
+                mode: self.shaders.of(MaterialId::from_index(index)).mode().name(),
+                hits: totals.hits[index],
+                seconds: totals.shade_seconds[index],
+            })
+            .collect();
+        Report {
+            stats: Stats {
+                seconds: totals.seconds,
+                threads: rayon::current_num_threads(),
+                rays: totals.rays.into(),
+                samples: totals.samples,
+                bytes_per_sample: totals.bytes as f64 / (totals.samples as f64).max(1.0),
+                lines: Lines::new(totals.lines, gate),
+                gate: gate.into(),
+                peak_rss_bytes: stats::peak_memory(),
+                triangles: self.scene.triangle_count(),
+                shaders,
+                plan: self.plan.to_string(),
+            },
+            script_errors: errors.into_diagnostics(),
+            warnings: gate_warnings(self.scene, &totals.gate),
+            complete: self.complete,
+        }
+    }
+}
+
+/// What the gate stopped, as a warning for each material and kind.
+fn gate_warnings(scene: &Scene, gate: &[GateCounts]) -> Diagnostics {
+    let mut warnings = Diagnostics::default();
+    for (material, counts) in scene.materials().iter().zip(gate.get(1..).unwrap_or_default()) {
+        let script = &scene.scripts()[material.script.index()].source.name;
+        let mut warn = |count: u64, what: &str, hint: String| {
+            if count > 0 {
+                let plural = if count == 1 { "" } else { "s" };
+                warnings.push(
+                    Diagnostic::warning(format!(
+                        "{script}: the shader of material `{}` gave {what} at {count} hit{plural}",
+                        material.name
+                    ))
+                    .hint(hint),
+                );
+            }
+        };
+        warn(counts.nan, "NaN", "NaN counts as 0; look for 0/0, sqrt or ln of negative numbers".into());
+        warn(counts.infinite, "an infinite number", "infinity counts as 0; look for divisions by 0".into());
+        warn(counts.negative, "a negative line width", "a width of 0 or less draws no line".into());
+        warn(
+            counts.clamped_widths,
+            &format!("a line wider than max_width ({} px)", scene.lines().max_width),
+            "wider lines are drawn at max_width; raise it in [lines] if they are meant".into(),
+        );
+    }
+    warnings
+}

@@ -1,0 +1,330 @@
+//! How a [`SampleBuffer`] is filled: node by node, through the [gate](super::gate).
+//!
+//! The tracer works in waves, so nodes of one path mostly arrive in the order of their samples; then closing the buffer
+//! copies nothing. A column starts as [`Column::Constant`] and becomes one value per row at the first value that
+//! differs, so uniform columns never cost memory.
+
+use super::buffer::{Column, Node, NodeColumnSet, NodeColumns, PixelRect, SampleBuffer, SampleColor};
+use super::gate::{Faults, GateLog, clean_node};
+use super::path::NodePath;
+
+/// What a [`SampleBufferBuilder`] keeps.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SampleLayout {
+    /// Samples per pixel, at least 1.
+    pub samples_per_pixel: u32,
+    /// Columns of the nodes.
+    pub columns: NodeColumnSet,
+    /// Whether the camera's nodes keep their world position.
+    pub position: bool,
+    /// How many extra outputs the camera's nodes keep.
+    pub aovs: usize,
+    /// Line widths above this, in pixels, are clamped by the gate.
+    pub max_width: f32,
+    /// Materials in the scene: `shader` values are 0 … this, included.
+    pub materials: usize,
+}
+
+/// Fills a [`SampleBuffer`]. Nodes of one path may arrive in any order of samples; the order of the samples is the
+/// fast one.
+#[derive(Debug)]
+pub struct SampleBufferBuilder {
+    layout: SampleLayout,
+    rect: PixelRect,
+    offset: Vec<[f32; 2]>,
+    color: Vec<SampleColor>,
+    position: Column<[f32; 3]>,
+    aovs: Vec<Column<[f32; 3]>>,
+    paths: Vec<PathRows>,
+    /// Where in `paths` the last node went: waves come path by path.
+    last: usize,
+    gate: GateLog,
+    /// Faults of extra outputs; who made them is known when the camera's nodes are complete.
+    extra_faults: Vec<(u32, Faults)>,
+}
+
+impl SampleBufferBuilder {
+    /// An empty buffer for a rectangle: black, transparent samples at their pixels' corners, without nodes.
+    #[must_use]
+    pub fn new(rect: PixelRect, layout: &SampleLayout) -> Self {
+        let samples = rect.pixels() * layout.samples_per_pixel as usize;
+        let kept = |keep: bool| if keep { Column::Values(vec![[0.0; 3]; samples]) } else { Column::Constant([0.0; 3]) };
+        Self {
+            rect,
+            offset: vec![[0.0; 2]; samples],
+            color: vec![SampleColor::default(); samples],
+            position: kept(layout.position),
+            aovs: vec![kept(true); layout.aovs],
+            paths: vec![PathRows::new(NodePath::CAMERA, samples)],
+            last: 0,
+            gate: GateLog::default(),
+            extra_faults: Vec::new(),
+            layout: layout.clone(),
+        }
+    }
+
+    /// Sets a sample's place in its pixel (each component 0 … 1) and its colour. The gate checks the colour; `shader`
+    /// is who made it.
+    ///
+    /// # Panics
+    /// If the rectangle has no such sample. So do [`Self::set_extras`] and [`Self::push`].
+    pub fn set_sample(&mut self, sample: u32, offset: [f32; 2], color: SampleColor, shader: u32) {
+        let mut faults = Faults::default();
+        let [alpha] = faults.numbers([color.alpha]);
+        let clean = SampleColor { color: faults.numbers(color.color), alpha };
+        self.gate.note(NodePath::CAMERA, sample, shader, faults);
+        // The bounds of the line search rely on the range.
+        self.offset[sample as usize] = Faults::default().numbers(offset).map(|x| x.clamp(0.0, 1.0));
+        self.color[sample as usize] = clean;
+    }
+
+    /// Sets what only the camera's node of a sample keeps: position and extra outputs (as many as the layout says).
+    pub fn set_extras(&mut self, sample: u32, position: [f32; 3], aovs: &[[f32; 3]]) {
+        let mut faults = Faults::default();
+        if let Column::Values(values) = &mut self.position {
+            values[sample as usize] = faults.numbers(position);
+        }
+        for (column, &value) in self.aovs.iter_mut().zip(aovs) {
+            if let Column::Values(values) = column {
+                values[sample as usize] = faults.numbers(value);
+            }
+        }
+        if !faults.is_empty() {
+            self.extra_faults.push((sample, faults));
+        }
+    }
+
+    /// Adds a node; of several at one path of one sample the first stays. Columns that the layout does not keep are
+    /// dropped here; the gate checks the others.
+    pub fn push(&mut self, path: NodePath, sample: u32, node: Node) {
+        assert!((sample as usize) < self.offset.len(), "sample {sample} lies outside the buffer");
+        let (node, faults) = clean_node(node, self.layout.columns, self.layout.max_width);
+        self.gate.note(path, sample, node.shader, faults);
+        if self.paths[self.last].path != path {
+            self.last = self.paths.iter().position(|rows| rows.path == path).unwrap_or_else(|| {
+                self.paths.push(PathRows::new(path, 0));
+                self.paths.len() - 1
+            });
+        }
+        self.paths[self.last].push(sample, &node, self.layout.columns);
+    }
+
+    /// Sorts the nodes and closes the buffer. A sample without a camera node gets a miss.
+    #[must_use]
+    pub fn finish(mut self) -> SampleBuffer {
+        self.add_missing_camera_nodes();
+        self.paths.sort_by_key(|rows| rows.path);
+        let paths: Vec<_> =
+            self.paths.into_iter().map(|rows| rows.finish(&self.rect, self.layout.samples_per_pixel)).collect();
+        for (sample, faults) in self.extra_faults {
+            self.gate.note(NodePath::CAMERA, sample, paths[0].shader.get(sample as usize), faults);
+        }
+        SampleBuffer {
+            rect: self.rect,
+            samples_per_pixel: self.layout.samples_per_pixel,
+            offset: self.offset,
+            color: self.color,
+            position: self.position.collapsed(),
+            aovs: self.aovs.into_iter().map(Column::collapsed).collect(),
+            paths,
+            gate: self.gate.counts(self.layout.materials),
+        }
+    }
+
+    fn add_missing_camera_nodes(&mut self) {
+        let camera = &mut self.paths[0];
+        if camera.rising && camera.sample.len() == self.offset.len() {
+            return;
+        }
+        let mut present = vec![false; self.offset.len()];
+        for &sample in &camera.sample {
+            present[sample as usize] = true;
+        }
+        for sample in (0..).zip(present).filter_map(|(sample, present)| (!present).then_some(sample)) {
+            camera.push(sample, &Node::default(), self.layout.columns);
+        }
+    }
+}
+
+/// The nodes of one path, in the order they came.
+#[derive(Debug)]
+struct PathRows {
+    path: NodePath,
+    /// How many rows to make room for.
+    expected: usize,
+    /// Whether `sample` has been strictly rising.
+    rising: bool,
+    sample: Vec<u32>,
+    object: Column<u32>,
+    shader: Column<u32>,
+    uv: Column<[f32; 2]>,
+    normal: Column<[f32; 3]>,
+    feature: Column<[f32; 3]>,
+    depth: Column<f32>,
+    line_color: Column<[f32; 3]>,
+    line_width: Column<f32>,
+    priority: Column<i32>,
+    throughput: Column<[f32; 3]>,
+    contribution: Column<[f32; 3]>,
+}
+
+impl PathRows {
+    fn new(path: NodePath, expected: usize) -> Self {
+        let neutral = Node::default();
+        Self {
+            path,
+            expected,
+            rising: true,
+            sample: Vec::with_capacity(expected),
+            object: Column::Constant(neutral.object),
+            shader: Column::Constant(neutral.shader),
+            uv: Column::Constant(neutral.uv),
+            normal: Column::Constant(neutral.normal),
+            feature: Column::Constant(neutral.feature),
+            depth: Column::Constant(neutral.depth),
+            line_color: Column::Constant(neutral.line_color),
+            line_width: Column::Constant(neutral.line_width),
+            priority: Column::Constant(neutral.priority),
+            throughput: Column::Constant(neutral.throughput),
+            contribution: Column::Constant(neutral.contribution),
+        }
+    }
+
+    fn push(&mut self, sample: u32, node: &Node, kept: NodeColumnSet) {
+        let (row, expected) = (self.sample.len(), self.expected);
+        self.rising &= self.sample.last().is_none_or(|&last| last < sample);
+        self.sample.push(sample);
+        self.object.push(row, node.object, expected);
+        self.shader.push(row, node.shader, expected);
+        self.depth.push(row, node.depth, expected);
+        if kept.uv {
+            self.uv.push(row, node.uv, expected);
+        }
+        if kept.normal {
+            self.normal.push(row, node.normal, expected);
+        }
+        if kept.feature {
+            self.feature.push(row, node.feature, expected);
+        }
+        if kept.lines {
+            self.line_color.push(row, node.line_color, expected);
+            self.line_width.push(row, node.line_width, expected);
+            self.priority.push(row, node.priority, expected);
+        }
+        if kept.throughput {
+            self.throughput.push(row, node.throughput, expected);
+        }
+        if kept.contribution {
+            self.contribution.push(row, node.contribution, expected);
+        }
+    }
+
+    fn finish(self, rect: &PixelRect, samples_per_pixel: u32) -> NodeColumns {
+        let order = (!self.rising).then(|| {
+            let mut order: Vec<u32> = (0..).take(self.sample.len()).collect();
+            order.sort_by_key(|&row| self.sample[row as usize]);
+            order.dedup_by_key(|row| self.sample[*row as usize]);
+            order
+        });
+        let order = order.as_deref();
+        let sample = match order {
+            Some(order) => order.iter().map(|&row| self.sample[row as usize]).collect(),
+            None => self.sample,
+        };
+        let mut first = vec![0; rect.pixels() + 1];
+        for &sample in &sample {
+            first[(sample / samples_per_pixel) as usize + 1] += 1;
+        }
+        for pixel in 1..first.len() {
+            first[pixel] += first[pixel - 1];
+        }
+        NodeColumns {
+            path: self.path,
+            first,
+            sample,
+            object: self.object.ordered(order),
+            shader: self.shader.ordered(order),
+            uv: self.uv.ordered(order),
+            normal: self.normal.ordered(order),
+            feature: self.feature.ordered(order),
+            depth: self.depth.ordered(order),
+            line_color: self.line_color.ordered(order),
+            line_width: self.line_width.ordered(order),
+            priority: self.priority.ordered(order),
+            throughput: self.throughput.ordered(order),
+            contribution: self.contribution.ordered(order),
+        }
+    }
+}
+
+impl<T: Copy + PartialEq> Column<T> {
+    /// Appends the value of row number `row`. Behind the gate `==` means equal bits, so nothing is lost when equal
+    /// values share one.
+    fn push(&mut self, row: usize, value: T, expected: usize) {
+        match self {
+            Self::Values(values) => values.push(value),
+            Self::Constant(constant) if row == 0 => *constant = value,
+            Self::Constant(constant) if *constant == value => {}
+            Self::Constant(constant) => {
+                let mut values = Vec::with_capacity(expected.max(row + 1));
+                values.resize(row, *constant);
+                values.push(value);
+                *self = Self::Values(values);
+            }
+        }
+    }
+
+    /// The values in another order, in no more memory than they need.
+    fn ordered(self, order: Option<&[u32]>) -> Self {
+        match (self, order) {
+            (Self::Values(values), Some(order)) => {
+                Self::Values(order.iter().map(|&row| values[row as usize]).collect()).collapsed()
+            }
+            (Self::Values(mut values), None) => {
+                values.shrink_to_fit();
+                Self::Values(values)
+            }
+            (constant, _) => constant,
+        }
+    }
+
+    /// [`Self::Constant`] if all values are equal.
+    fn collapsed(self) -> Self {
+        match &self {
+            Self::Values(values) => match values.split_first() {
+                Some((first, rest)) if rest.iter().all(|value| value == first) => Self::Constant(*first),
+                _ => self,
+            },
+            Self::Constant(_) => self,
+        }
+    }
+}
+
+/// A sample as data, for tests and for line work on pictures from elsewhere.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct HandMadeSample<'a> {
+    /// Place in the pixel, each component 0 … 1.
+    pub offset: [f32; 2],
+    /// Colour without lines.
+    pub color: SampleColor,
+    /// Its nodes, at most one per path.
+    pub nodes: &'a [(NodePath, Node)],
+}
+
+impl SampleBuffer {
+    /// A buffer from samples in order (pixel by pixel, row by row), through the gate as if they had been traced.
+    /// Samples that are missing at the end are transparent misses; any too many are ignored.
+    #[must_use]
+    pub fn from_samples(rect: PixelRect, layout: &SampleLayout, samples: &[HandMadeSample<'_>]) -> Self {
+        let mut builder = SampleBufferBuilder::new(rect, layout);
+        let count = builder.offset.len();
+        for (index, sample) in (0..).zip(samples.iter().take(count)) {
+            let shader = sample.nodes.iter().find(|(path, _)| *path == NodePath::CAMERA).map_or(0, |(_, n)| n.shader);
+            builder.set_sample(index, sample.offset, sample.color, shader);
+            for &(path, node) in sample.nodes {
+                builder.push(path, index, node);
+            }
+        }
+        builder.finish()
+    }
+}

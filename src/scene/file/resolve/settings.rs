@@ -1,0 +1,119 @@
+//! `[render]` and `[lines]`.
+
+use super::super::document::Node;
+use super::super::format;
+use super::{Resolver, rgb};
+use crate::diag::Diagnostic;
+use crate::math::Vec3;
+use crate::scene::settings::{Background, Composition, FilterKind, LineSettings, RayKinds, RenderSettings};
+use crate::scene::texture::{Texture, TextureFilter, Wrap};
+
+impl Resolver<'_> {
+    pub(super) fn render(&mut self, render: &format::Render) {
+        let node = self.part("render");
+        let depth = render.reflection_depth + render.refraction_depth;
+        if depth > 30 {
+            let span = ["refraction_depth", "reflection_depth"].iter().find_map(|key| node.get(key)).unwrap_or(node);
+            let message = format!("`reflection_depth` and `refraction_depth` add up to {depth}: 30 is the most");
+            self.fault(message, span.span.clone());
+        }
+        if render.strata.is_some_and(|strata| strata != 1) {
+            let warning = Diagnostic::warning("strata are not built yet: `strata` is ignored");
+            self.faults.push(warning.at(node.key_span("strata")));
+        }
+        let background = match &render.background {
+            format::Background::Transparent(_) => Background::Transparent,
+            format::Background::Color(color) => Background::Color(rgb(*color)),
+            format::Background::Gradient(format::Gradient { bottom, top }) => {
+                Background::Gradient { bottom: rgb(*bottom), top: rgb(*top) }
+            }
+            format::Background::Image(image) => self.background_image(image, node),
+        };
+        self.scene.render = RenderSettings {
+            size: render.size,
+            samples: render.samples,
+            seed: render.seed,
+            background,
+            ambient: match render.ambient {
+                format::Ambient::Gray(level) => Vec3::splat(level as f32),
+                format::Ambient::Color(color) => rgb(color),
+            },
+            filter: match render.filter {
+                format::Filter::Box => FilterKind::Box,
+                format::Filter::Tent => FilterKind::Tent,
+                format::Filter::Gaussian => FilterKind::Gaussian,
+                format::Filter::Mitchell => FilterKind::Mitchell,
+                format::Filter::BlackmanHarris => FilterKind::BlackmanHarris,
+            },
+            filter_radius: render.filter_radius as f32,
+            reflection_depth: render.reflection_depth,
+            refraction_depth: render.refraction_depth,
+        };
+    }
+
+    fn background_image(&mut self, background: &format::BackgroundImage, render: &Node) -> Background {
+        let span = render.get("background").unwrap_or(render).span_of("image");
+        let path = self.path(&background.image, &span);
+        let Some(image) = self.image(&path, true, &span) else { return Background::Transparent };
+        let texture = self.scene.add_texture(Texture {
+            name: background.image.clone(),
+            image,
+            wrap: [Wrap::Repeat, Wrap::Clamp],
+            filter: TextureFilter::Linear,
+        });
+        Background::Image { texture, strength: background.strength as f32 }
+    }
+
+    pub(super) fn lines(&mut self, lines: &format::Lines) {
+        let node = self.part("lines");
+        if lines.surfaces > 1 {
+            let fault = Diagnostic::error("surface lists are not built yet: `surfaces` can only be 1");
+            self.faults.push(fault.at(node.span_of("surfaces")));
+        }
+        if let format::Threshold::Above(degrees) = lines.normal
+            && degrees > 180.0
+        {
+            self.fault(
+                format!("`lines.normal` is an angle of at most 180 degrees, found {degrees}"),
+                node.span_of("normal"),
+            );
+        }
+        if lines.min_width > lines.max_width {
+            let message = format!("`min_width` is {} and `max_width` only {}", lines.min_width, lines.max_width);
+            self.fault(message, node.span_of("min_width"));
+        }
+        if lines.width > lines.max_width {
+            let message = format!("lines are drawn {} pixels wide, as `max_width` says", lines.max_width);
+            let warning = Diagnostic::warning(message).at(node.span_of("width"));
+            self.faults.push(warning.hint(format!("set `max_width = {}`, too", lines.width)));
+        }
+        let paths = lines.paths.iter().map(|path| match path {
+            format::LinePath::Camera => RayKinds::CAMERA,
+            format::LinePath::Reflection => RayKinds::REFLECTION,
+            format::LinePath::Refraction => RayKinds::REFRACTION,
+        });
+        let threshold = |threshold| match threshold {
+            format::Threshold::Off(_) => None,
+            format::Threshold::Above(value) => Some(value as f32),
+        };
+        self.scene.lines = LineSettings {
+            enabled: true,
+            color: rgb(lines.color),
+            width: lines.width as f32,
+            max_width: lines.max_width as f32,
+            min_width: lines.min_width as f32,
+            width_compensation: lines.width_compensation,
+            object: lines.object,
+            shader: lines.shader,
+            uv: threshold(lines.uv),
+            normal: threshold(lines.normal),
+            feature: threshold(lines.feature),
+            paths: paths.fold(RayKinds::empty(), RayKinds::union),
+            tint: lines.tint,
+            compose: match lines.compose {
+                format::Compose::Replace => Composition::Replace,
+                format::Compose::Throughput => Composition::Throughput,
+            },
+        };
+    }
+}

@@ -1,0 +1,23 @@
+//! Rays: from a tile of pixels to its samples.
+//!
+//! - [`triangle`]: the watertight ray–triangle test.
+//! - [`tree`]: one bounding volume hierarchy over the triangles of a mesh, and the traversal all hierarchies share.
+//! - [`world`]: one hierarchy over the objects; closest hits and shadow rays.
+//! - [`surface`]: from a hit to a place with normals, texture coordinates and error bounds.
+//! - [`wave`]: the rays of a tile, one depth of the ray tree at a time; `shadow` finds what lights give a hit, `scatter`
+//!   shades hits and sends rays on.
+//!
+//! Everything here works relative to the camera's position, so that precision is best where the camera looks from,
+//! wherever in the world that is.
+
+mod ray_tree;
+mod scatter;
+mod shadow;
+pub mod surface;
+pub mod tree;
+pub mod triangle;
+pub mod wave;
+pub mod world;
+
+pub use wave::{RayCounts, TileTracer, TraceContext};
+pub use world::World;

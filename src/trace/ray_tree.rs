@@ -1,0 +1,123 @@
+//! The ray trees of a run of samples while they are traced.
+
+use super::surface::Surface;
+use super::world::Hit;
+use crate::math::Vec3;
+use crate::sample::{Node, NodePath};
+use crate::scene::ids::MaterialId;
+use crate::shade::PathKind;
+
+/// A node of a sample's ray tree.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct TreeNode {
+    /// The sample, as an index into the tile's buffer.
+    pub sample: u32,
+    pub parent: Option<u32>,
+    pub path: NodePath,
+    pub kind: PathKind,
+    /// What of this node its parent sees.
+    pub weight: Vec3,
+    /// Whether the ray went straight on through its parent, which then lets alpha through.
+    pub straight: bool,
+    /// Letters of the path that are reflections.
+    pub reflections: u32,
+    /// Letters of the path that are refractions.
+    pub refractions: u32,
+    /// Width of the pixel's cone where the ray starts.
+    pub cone_width: f32,
+    /// Path length from the camera to where the ray starts.
+    pub length_before: f32,
+    /// What the line pass will see; `throughput` is set from the start, the rest once a surface is found.
+    pub attributes: Node,
+    /// Radiance along the ray, without the parent's weight.
+    pub radiance: Vec3,
+    /// Coverage along the ray.
+    pub alpha: f32,
+    pub opacity: f32,
+}
+
+impl TreeNode {
+    /// The node of a camera ray.
+    pub fn root(sample: u32, cone_width: f32) -> Self {
+        Self {
+            sample,
+            parent: None,
+            path: NodePath::CAMERA,
+            kind: PathKind::Camera,
+            weight: Vec3::ONE,
+            straight: false,
+            reflections: 0,
+            refractions: 0,
+            cone_width,
+            length_before: 0.0,
+            attributes: Node::default(),
+            radiance: Vec3::ZERO,
+            alpha: 1.0,
+            opacity: 1.0,
+        }
+    }
+}
+
+/// A ray that looks for the surface of a node.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct WaveRay {
+    pub origin: Vec3,
+    pub direction: Vec3,
+    pub node: u32,
+    /// Distance already covered through invisible surfaces, and their number.
+    pub covered: f32,
+    pub passed: u32,
+}
+
+/// A ray that met a surface, on its way to be shaded.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct WaveHit {
+    pub ray: WaveRay,
+    pub hit: Hit,
+    pub surface: Surface,
+    pub material: MaterialId,
+    /// Length of the ray.
+    pub distance: f32,
+    /// Path length from the camera.
+    pub depth: f32,
+}
+
+/// A run of samples: their trees so far, and the rays that are still to be traced.
+#[derive(Debug, Default)]
+pub(super) struct Run {
+    /// All nodes; those of the camera come first, children stand after their parents.
+    pub nodes: Vec<TreeNode>,
+    /// Rays that met something invisible and go on in this wave, for the same node.
+    pub again: Vec<WaveRay>,
+    /// The next wave.
+    pub next: Vec<WaveRay>,
+    /// World position at each camera node, if the plan keeps them.
+    pub positions: Vec<Vec3>,
+    /// Extra outputs at each camera node, `aov_count` each.
+    pub aovs: Vec<Vec3>,
+}
+
+impl Run {
+    /// Empties the run and keeps its memory.
+    pub fn clear(&mut self) {
+        let Self { nodes, again, next, positions, aovs } = self;
+        nodes.clear();
+        again.clear();
+        next.clear();
+        positions.clear();
+        aovs.clear();
+    }
+
+    /// Adds each node's radiance to its parent's. A parent's reflection stands before its refraction, so the order of
+    /// additions is always the same.
+    pub fn gather_radiance(&mut self) {
+        for index in (0..self.nodes.len()).rev() {
+            let TreeNode { weight, radiance, alpha, straight, parent, .. } = self.nodes[index];
+            if let Some(parent) = parent {
+                let parent = &mut self.nodes[parent as usize];
+                parent.radiance += weight * radiance;
+                parent.alpha = if straight { parent.opacity + (1.0 - parent.opacity) * alpha } else { 1.0 };
+            }
+        }
+    }
+}

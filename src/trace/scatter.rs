@@ -1,0 +1,330 @@
+//! Shading: groups of hits of one material become node attributes, radiance and further rays.
+
+use std::time::Instant;
+
+use super::ray_tree::{Run, TreeNode, WaveHit, WaveRay};
+use super::wave::{TileTracer, TraceContext, Work, value};
+use crate::math::{Vec2, Vec3, luminance};
+use crate::plan::MaterialPlan;
+use crate::sample::{Node, NodePath};
+use crate::scene::ids::MaterialId;
+use crate::shade::batch::{HitBatch, LightSample, OutputBatch};
+use crate::shade::bsdf::Bounces;
+use crate::shade::{Bsdf, InputSet, Mode, PathKind};
+
+/// A branch of the ray tree that weighs less than this in every channel is not traced: it could not change an 8-bit
+/// picture.
+const LEAST_THROUGHPUT: f32 = 1.0 / 512.0;
+
+/// The outputs of a material's shader at one hit: a batch and a row in it.
+#[derive(Clone, Copy)]
+struct Outputs<'a> {
+    batch: &'a OutputBatch,
+    row: usize,
+}
+
+impl TileTracer<'_> {
+    /// Shades hits of one material: fills their nodes and sends on what they mirror and let pass.
+    pub(super) fn shade_group(
+        &self,
+        group: &[WaveHit],
+        run: &mut Run,
+        context: &mut TraceContext<'_>,
+        work: &mut Work,
+    ) {
+        let Some(material) = group.first().map(|hit| hit.material) else { return };
+        let plan = &self.plan.materials[material.index()];
+        let lights = if plan.lights { self.light_samples(group, context, work) } else { Vec::new() };
+        let lights_per_hit = if plan.lights { self.lighting.len() } else { 0 };
+
+        let start = Instant::now();
+        let constant = plan.mode == Mode::Constant;
+        if constant {
+            self.evaluate_once(material, context);
+        } else {
+            self.evaluate(material, group, run, &lights, context);
+        }
+        work.hits[material.index()] += group.len() as u64;
+        work.shade_seconds[material.index()] += start.elapsed().as_secs_f64();
+
+        let batch = match &context.constants[material.index()] {
+            Some(outputs) if constant => outputs,
+            _ => &context.outputs,
+        };
+        for (index, hit) in group.iter().enumerate() {
+            let outputs = Outputs { batch, row: if constant { 0 } else { index } };
+            let lights = &lights[index * lights_per_hit..(index + 1) * lights_per_hit];
+            self.finish(hit, plan, outputs, lights, run);
+        }
+    }
+
+    /// Runs the shader of a constant material, once per context.
+    fn evaluate_once(&self, material: MaterialId, context: &mut TraceContext<'_>) {
+        let TraceContext { shading, hits, errors, constants, .. } = context;
+        let constant = &mut constants[material.index()];
+        if constant.is_none() {
+            hits.clear();
+            hits.len = 1;
+            hits.material_id = material.0 + 1;
+            let outputs = constant.insert(OutputBatch::default());
+            shading.shade(material, hits, self.plan.materials[material.index()].wanted, outputs, errors);
+        }
+    }
+
+    /// Runs a material's shader over a group of hits, into the context's outputs.
+    fn evaluate(
+        &self,
+        material: MaterialId,
+        group: &[WaveHit],
+        run: &Run,
+        lights: &[LightSample],
+        context: &mut TraceContext<'_>,
+    ) {
+        let plan = &self.plan.materials[material.index()];
+        let TraceContext { shading, hits, outputs, errors, .. } = context;
+        hits.clear();
+        hits.material_id = material.0 + 1;
+        hits.time = self.scene.time();
+        hits.light_count = self.lighting.len();
+        hits.lights.extend_from_slice(lights);
+        for hit in group {
+            let node = &run.nodes[hit.ray.node as usize];
+            self.gather(hits, plan.inputs, hit, node.kind, node.cone_width);
+        }
+        shading.shade(material, hits, plan.wanted, outputs, errors);
+    }
+
+    /// Adds one hit to a batch: only the columns that are read.
+    pub(super) fn gather(
+        &self,
+        batch: &mut HitBatch,
+        inputs: InputSet,
+        hit: &WaveHit,
+        kind: PathKind,
+        cone_width: f32,
+    ) {
+        let object = self.world.object(hit.hit.object);
+        let surface = &hit.surface;
+        batch.len += 1;
+        if inputs.contains(InputSet::POSITION) {
+            batch.position.push(self.in_world(surface.position));
+        }
+        if inputs.contains(InputSet::NORMAL) {
+            batch.normal.push(surface.normal);
+        }
+        if inputs.contains(InputSet::GEOMETRIC_NORMAL) {
+            batch.geometric_normal.push(surface.geometric_normal);
+        }
+        if inputs.contains(InputSet::INCOMING) {
+            batch.incoming.push(hit.ray.direction);
+        }
+        if inputs.contains(InputSet::UV) {
+            batch.uv.push(surface.uv(object, &hit.hit, 0));
+        }
+        if inputs.contains(InputSet::MORE_UVS) {
+            // Meshes of one material may differ in how many sets they have; missing ones read as 0.
+            let sets = (object.mesh.uvs.len().max(1) - 1).max(batch.more_uvs.len());
+            batch.more_uvs.resize_with(sets, || vec![Vec2::ZERO; batch.len - 1]);
+            for (set, column) in batch.more_uvs.iter_mut().enumerate() {
+                column.push(surface.uv(object, &hit.hit, set + 1));
+            }
+        }
+        if inputs.contains(InputSet::TANGENT) {
+            batch.tangent.push(surface.tangent(object, &hit.hit));
+        }
+        if inputs.contains(InputSet::COLOR) {
+            batch.color.push(surface.color(object, &hit.hit));
+        }
+        if inputs.contains(InputSet::OBJECT_ID) {
+            batch.object_id.push(hit.hit.object.0 + 1);
+        }
+        if inputs.contains(InputSet::POLYGON_ID) {
+            let triangle = hit.hit.triangle;
+            batch.polygon_id.push(object.mesh.polygons.get(triangle as usize).copied().unwrap_or(triangle));
+        }
+        if inputs.contains(InputSet::BARYCENTRIC) {
+            batch.barycentric.push(surface.barycentric);
+        }
+        if inputs.contains(InputSet::DISTANCE) {
+            batch.distance.push(hit.distance);
+        }
+        if inputs.contains(InputSet::DEPTH) {
+            batch.depth.push(hit.depth);
+        }
+        if inputs.contains(InputSet::PATH_KIND) {
+            batch.path_kind.push(kind);
+        }
+        if inputs.contains(InputSet::FRONT_FACING) {
+            batch.front_facing.push(surface.front);
+        }
+        if inputs.contains(InputSet::PIXELS_PER_UNIT) {
+            let width = cone_width + self.cone.1 * hit.distance;
+            batch.pixels_per_unit.push(1.0 / width.max(f32::MIN_POSITIVE));
+        }
+        if inputs.contains(InputSet::CURVATURE) {
+            batch.curvature.push(surface.curvature(object, &hit.hit));
+        }
+    }
+
+    /// Lights one hit, fills its node, and sends on what it mirrors and lets pass.
+    fn finish(&self, hit: &WaveHit, plan: &MaterialPlan, outputs: Outputs<'_>, lights: &[LightSample], run: &mut Run) {
+        let direction = hit.ray.direction;
+        let Outputs { batch, row } = outputs;
+        let opacity = value(&batch.opacity, row, 1.0);
+        let opacity = if opacity.is_nan() { 1.0 } else { opacity.clamp(0.0, 1.0) };
+        if opacity == 0.0 {
+            // Not there: the ray goes on for the same node.
+            run.again.push(WaveRay {
+                origin: hit.surface.leave(direction),
+                direction,
+                node: hit.ray.node,
+                covered: hit.distance,
+                passed: hit.ray.passed + 1,
+            });
+            return;
+        }
+
+        // What the line pass and the layers need.
+        let index = hit.ray.node as usize;
+        let node = &mut run.nodes[index];
+        node.attributes = Node { throughput: node.attributes.throughput, ..self.attributes(hit, outputs) };
+        node.opacity = opacity;
+        node.alpha = opacity;
+        if node.path == NodePath::CAMERA {
+            if let Some(position) = run.positions.get_mut(index) {
+                *position = self.in_world(hit.surface.position);
+            }
+            let count = self.plan.layout.aovs;
+            for (aov, column) in run.aovs[index * count..(index + 1) * count].iter_mut().zip(&batch.aovs) {
+                *aov = value(column, row, Vec3::ZERO);
+            }
+        }
+
+        // Its own radiance, and what it sends on.
+        let mut bounces = Bounces::default();
+        let mut mirrored = Vec3::ZERO;
+        if let Some(color) = value(&batch.color, row, None) {
+            node.radiance = color * opacity;
+        } else if self.plan.color || plan.reflects || plan.refracts {
+            let bsdf = self.bsdf(hit, outputs);
+            mirrored = bsdf.mirror_direction(direction, hit.surface.geometric_normal);
+            if self.plan.color {
+                let mut radiance = value(&batch.emission, row, Vec3::ZERO);
+                let arriving = lights.iter().filter(|light| plan.lit && light.visibility > 0.0);
+                for light in arriving {
+                    radiance += bsdf.scatter(-direction, light.direction, light.radiance * light.visibility);
+                }
+                let background = self.lighting.background(mirrored);
+                radiance += bsdf.surroundings(-direction, self.lighting.ambient, background);
+                node.radiance = radiance * opacity;
+            }
+            if plan.reflects || plan.refracts {
+                bounces = bsdf.bounces(direction, hit.surface.geometric_normal);
+            }
+        }
+
+        let node = *node;
+        if node.reflections < self.plan.reflection_depth {
+            let weight = bounces.reflection * opacity;
+            self.send(
+                hit,
+                &node,
+                Departure { kind: PathKind::Reflection, direction: mirrored, weight, straight: false },
+                run,
+            );
+        }
+        if node.refractions < self.plan.refraction_depth {
+            let refraction = bounces.refraction * opacity;
+            let through = Vec3::splat(1.0 - opacity);
+            // One ray stands for both ways through a surface that is see-through and refracts.
+            let straight = luminance(through) >= luminance(refraction);
+            let direction = if straight { direction } else { bounces.refracted };
+            let weight = refraction + through;
+            self.send(hit, &node, Departure { kind: PathKind::Refraction, direction, weight, straight }, run);
+        }
+    }
+
+    fn attributes(&self, hit: &WaveHit, Outputs { batch, row }: Outputs<'_>) -> Node {
+        let object = &self.scene.objects()[hit.hit.object.index()];
+        let placed = self.world.object(hit.hit.object);
+        let lines = self.scene.lines();
+        let width = value(&batch.line_width, row, None).unwrap_or(lines.width);
+        let priority = value(&batch.priority, row, None)
+            .or(object.priority)
+            .or(self.scene.materials()[hit.material.index()].priority)
+            .unwrap_or(0);
+        let uv = self.plan.layout.columns.uv.then(|| hit.surface.uv(placed, &hit.hit, 0));
+        Node {
+            object: hit.hit.object.0 + 1,
+            shader: hit.material.0 + 1,
+            uv: uv.unwrap_or_default().to_array(),
+            normal: hit.surface.normal.to_array(),
+            feature: value(&batch.feature, row, Vec3::ZERO).to_array(),
+            depth: hit.depth,
+            line_color: value(&batch.line_color, row, None).unwrap_or(lines.color).to_array(),
+            line_width: if object.lines { width } else { 0.0 },
+            priority,
+            throughput: [1.0; 3],
+            contribution: [0.0; 3],
+        }
+    }
+
+    fn bsdf(&self, hit: &WaveHit, Outputs { batch, row }: Outputs<'_>) -> Bsdf {
+        let surface = &hit.surface;
+        let normal = value(&batch.normal, row, None)
+            .and_then(Vec3::try_normalize)
+            .filter(|normal| normal.dot(surface.geometric_normal) > 0.0)
+            .unwrap_or(surface.normal);
+        Bsdf {
+            base_color: value(&batch.base_color, row, Vec3::splat(0.8)),
+            metallic: value(&batch.metallic, row, 0.0),
+            roughness: value(&batch.roughness, row, 1.0),
+            specular: value(&batch.specular, row, 1.0),
+            ior: value(&batch.ior, row, 1.5),
+            transmission: value(&batch.transmission, row, 0.0),
+            normal,
+            occlusion: value(&batch.occlusion, row, 1.0),
+            outside: surface.front,
+        }
+        .checked()
+    }
+
+    /// Sends a ray on from a hit, unless it could not be seen.
+    fn send(&self, hit: &WaveHit, parent: &TreeNode, departure: Departure, run: &mut Run) {
+        let Departure { kind, direction, weight, straight } = departure;
+        let throughput = Vec3::from(parent.attributes.throughput) * weight;
+        if !throughput.is_finite() || throughput.max_element() < LEAST_THROUGHPUT {
+            return;
+        }
+        let reflected = kind == PathKind::Reflection;
+        let origin = hit.surface.leave(direction);
+        run.next.push(WaveRay { origin, direction, node: run.nodes.len() as u32, covered: 0.0, passed: 0 });
+        run.nodes.push(TreeNode {
+            parent: Some(hit.ray.node),
+            path: if reflected { parent.path.reflected() } else { parent.path.refracted() },
+            kind,
+            weight,
+            straight,
+            reflections: parent.reflections + u32::from(reflected),
+            refractions: parent.refractions + u32::from(!reflected),
+            length_before: hit.depth,
+            attributes: Node { throughput: throughput.to_array(), ..Node::default() },
+            ..TreeNode::root(parent.sample, parent.cone_width + self.cone.1 * hit.distance)
+        });
+    }
+
+    /// A position relative to the camera, in the world.
+    fn in_world(&self, position: Vec3) -> Vec3 {
+        (position.as_dvec3() + self.world.origin).as_vec3()
+    }
+}
+
+/// A ray that leaves a hit.
+struct Departure {
+    kind: PathKind,
+    direction: Vec3,
+    /// What the hit's node sees of it.
+    weight: Vec3,
+    /// Whether it goes straight on through a see-through surface.
+    straight: bool,
+}

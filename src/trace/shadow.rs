@@ -1,0 +1,115 @@
+//! Light samples: what every light gives a hit, past what stands in the way.
+
+use std::time::Instant;
+
+use super::ray_tree::{WaveHit, WaveRay};
+use super::surface::Surface;
+use super::triangle::Ray;
+use super::wave::{TileTracer, TraceContext, Work, value};
+use super::world::Hit;
+use crate::math::Vec3;
+use crate::scene::ids::MaterialId;
+use crate::shade::batch::{HitBatch, LightSample, OutputBatch};
+use crate::shade::{InputSet, OutputSet, PathKind};
+
+impl TileTracer<'_> {
+    /// What every light gives each hit of a group, shadows included: `lights` samples a hit, hit by hit.
+    pub(super) fn light_samples(
+        &self,
+        group: &[WaveHit],
+        context: &mut TraceContext<'_>,
+        work: &mut Work,
+    ) -> Vec<LightSample> {
+        let mut samples = Vec::with_capacity(group.len() * self.lighting.len());
+        let mut passed = Vec::new();
+        let mut see_through = Vec::new();
+        for hit in group {
+            let surface = &hit.surface;
+            for light in 0..self.lighting.len() {
+                let (mut sample, distance) = self.lighting.sample(light, surface.position);
+                if sample.direction.dot(surface.geometric_normal) <= 0.0 {
+                    // In its own shadow.
+                    sample.visibility = 0.0;
+                } else if self.lighting.casts_shadows(light) && sample.radiance != Vec3::ZERO {
+                    work.rays.shadow += 1;
+                    let origin = surface.leave(sample.direction);
+                    let ray = Ray::new(origin, sample.direction);
+                    let opaque = |id: MaterialId| self.plan.materials[id.index()].blocks_light();
+                    // The light itself is no obstacle.
+                    let reach = distance * (1.0 - 1e-5);
+                    if self.world.blocked(&ray, reach, opaque, &mut passed) {
+                        sample.visibility = 0.0;
+                    }
+                    if sample.visibility > 0.0 {
+                        see_through.extend(passed.iter().map(|hit| (samples.len(), ray, *hit)));
+                    }
+                }
+                samples.push(sample);
+            }
+        }
+        if !see_through.is_empty() {
+            self.attenuate(&see_through, &mut samples, context, work);
+        }
+        samples
+    }
+
+    /// Lowers the visibility of light samples by what see-through surfaces on the way let pass: asks their shaders for
+    /// opacity and transmission with `path_kind` "shadow". Scripts see the lights there without shadows.
+    fn attenuate(
+        &self,
+        passed: &[(usize, Ray, Hit)],
+        samples: &mut [LightSample],
+        context: &mut TraceContext<'_>,
+        work: &mut Work,
+    ) {
+        let mut hits: Vec<(usize, WaveHit)> = passed
+            .iter()
+            .map(|(sample, ray, hit)| {
+                let wave_ray =
+                    WaveRay { origin: ray.origin, direction: ray.direction, node: 0, covered: 0.0, passed: 0 };
+                let surface = Surface::new(self.world, ray, hit);
+                let material = self.world.material(hit);
+                (*sample, WaveHit { ray: wave_ray, hit: *hit, surface, material, distance: hit.t, depth: hit.t })
+            })
+            .collect();
+        hits.sort_by_key(|(_, hit)| hit.material);
+        let mut passes = vec![1.0; hits.len()];
+        let mut first = 0;
+        while first < hits.len() {
+            let material = hits[first].1.material;
+            let end = first + hits[first..].partition_point(|(_, hit)| hit.material == material);
+            let plan = &self.plan.materials[material.index()];
+            let start = Instant::now();
+            let mut batch = HitBatch { material_id: material.0 + 1, time: self.scene.time(), ..HitBatch::default() };
+            batch.light_count = self.lighting.len();
+            for (_, hit) in &hits[first..end] {
+                self.gather(&mut batch, plan.inputs, hit, PathKind::Shadow, self.cone.0);
+                if plan.inputs.intersects(InputSet::LIGHTS) {
+                    let sample = |light| self.lighting.sample(light, hit.surface.position).0;
+                    batch.lights.extend((0..self.lighting.len()).map(sample));
+                }
+            }
+            let mut outputs = OutputBatch::default();
+            let wanted = plan.wanted & (OutputSet::OPACITY | OutputSet::TRANSMISSION | OutputSet::METALLIC);
+            context.shading.shade(material, &batch, wanted, &mut outputs, &mut context.errors);
+            work.hits[material.index()] += batch.len as u64;
+            work.shade_seconds[material.index()] += start.elapsed().as_secs_f64();
+            for (row, pass) in passes[first..end].iter_mut().enumerate() {
+                let opacity = value(&outputs.opacity, row, 1.0).clamp(0.0, 1.0);
+                let through = value(&outputs.transmission, row, 0.0).clamp(0.0, 1.0)
+                    * (1.0 - value(&outputs.metallic, row, 0.0).clamp(0.0, 1.0));
+                *pass = 1.0 - opacity * (1.0 - through);
+            }
+            first = end;
+        }
+        // In the order along each ray again: products round differently in other orders.
+        let mut order: Vec<usize> = (0..hits.len()).collect();
+        order.sort_by(|&a, &b| {
+            let key = |i: usize| (hits[i].0, hits[i].1.distance, hits[i].1.hit.object, hits[i].1.hit.triangle);
+            key(a).partial_cmp(&key(b)).unwrap_or(std::cmp::Ordering::Equal)
+        });
+        for index in order {
+            samples[hits[index].0].visibility *= passes[index];
+        }
+    }
+}

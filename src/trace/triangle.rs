@@ -1,0 +1,144 @@
+//! The watertight ray–triangle test of Woop, Benthin and Wald ("Watertight Ray/Triangle Intersection", JCGT 2013).
+//!
+//! The triangle is sheared into a space where the ray is the z axis; three edge functions then decide on which side
+//! of each edge the ray passes. For an edge that two triangles share, both compute the same two products and subtract
+//! them in opposite order, so a ray can never slip between them; where a function is exactly 0 in single precision it
+//! is computed again in double, where the products are exact.
+
+use crate::math::Vec3;
+
+/// A ray, with what the triangle test needs of it worked out.
+#[derive(Clone, Copy, Debug)]
+pub struct Ray {
+    /// Where it starts.
+    pub origin: Vec3,
+    /// Where it goes; of any finite length > 0, in which distances are counted.
+    pub direction: Vec3,
+    /// 1 / direction, with zeros replaced by values too small to matter (see [`Ray::new`]).
+    pub(super) inverse: Vec3,
+    axes: [usize; 3],
+    shear: Vec3,
+}
+
+/// Where a ray meets a triangle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TriangleHit {
+    /// Distance in lengths of the ray's direction, > 0.
+    pub t: f32,
+    /// Barycentric weight of the second vertex.
+    pub u: f32,
+    /// Barycentric weight of the third vertex.
+    pub v: f32,
+    /// Whether the ray met the side from which the vertices run counter-clockwise.
+    pub front: bool,
+}
+
+impl Ray {
+    /// A ray; `origin` and `direction` must be finite and `direction` not zero.
+    #[must_use]
+    pub fn new(origin: Vec3, direction: Vec3) -> Self {
+        debug_assert!(origin.is_finite() && direction.is_finite() && direction != Vec3::ZERO);
+        let magnitude = direction.abs();
+        let z = if magnitude.x > magnitude.y && magnitude.x > magnitude.z {
+            0
+        } else if magnitude.y > magnitude.z {
+            1
+        } else {
+            2
+        };
+        let (mut x, mut y) = ((z + 1) % 3, (z + 2) % 3);
+        // Keeps the winding of the sheared triangle.
+        if direction[z] < 0.0 {
+            std::mem::swap(&mut x, &mut y);
+        }
+        let shear = Vec3::new(direction[x] / direction[z], direction[y] / direction[z], 1.0 / direction[z]);
+        // A component of exactly 0 would make 0 · ∞ = NaN at a box face that contains the origin. At 1e-30 the ray
+        // strays less than a unit in the last place over any distance a float can hold beside its origin.
+        let safe = |d: f32| 1.0 / if d.abs() < 1e-30 { 1e-30_f32.copysign(d) } else { d };
+        let inverse = Vec3::new(safe(direction.x), safe(direction.y), safe(direction.z));
+        Self { origin, direction, inverse, axes: [x, y, z], shear }
+    }
+
+    /// The point at a distance.
+    #[must_use]
+    pub fn at(&self, t: f32) -> Vec3 {
+        self.origin + self.direction * t
+    }
+
+    /// Where the ray meets a triangle at 0 < t ≤ `t_max`. Triangles without area, and those with a coordinate that is
+    /// not finite, are never met.
+    #[inline]
+    #[must_use]
+    pub fn triangle(&self, vertices: &[Vec3; 3], t_max: f32) -> Option<TriangleHit> {
+        let [kx, ky, kz] = self.axes;
+        let [a, b, c] = vertices.map(|vertex| vertex - self.origin);
+        let ax = a[kx] - self.shear.x * a[kz];
+        let ay = a[ky] - self.shear.y * a[kz];
+        let bx = b[kx] - self.shear.x * b[kz];
+        let by = b[ky] - self.shear.y * b[kz];
+        let cx = c[kx] - self.shear.x * c[kz];
+        let cy = c[ky] - self.shear.y * c[kz];
+
+        let mut u = cx * by - cy * bx;
+        let mut v = ax * cy - ay * cx;
+        let mut w = bx * ay - by * ax;
+        if u == 0.0 || v == 0.0 || w == 0.0 {
+            let [ax, ay, bx, by, cx, cy] = [ax, ay, bx, by, cx, cy].map(f64::from);
+            u = (cx * by - cy * bx) as f32;
+            v = (ax * cy - ay * cx) as f32;
+            w = (bx * ay - by * ax) as f32;
+        }
+        if (u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0) {
+            return None;
+        }
+        let determinant = u + v + w;
+        let t_scaled = u * (self.shear.z * a[kz]) + v * (self.shear.z * b[kz]) + w * (self.shear.z * c[kz]);
+        let t = t_scaled / determinant;
+        // Written so that NaN (no area, or a coordinate that is not finite) is no hit.
+        if t > 0.0 && t <= t_max {
+            let front = determinant > 0.0;
+            Some(TriangleHit { t, u: v / determinant, v: w / determinant, front })
+        } else {
+            None
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TRIANGLE: [Vec3; 3] = [Vec3::ZERO, Vec3::X, Vec3::Y];
+
+    #[test]
+    fn the_side_and_weights_are_those_of_the_vertices() {
+        for (from, front) in [(1.0, true), (-1.0, false)] {
+            let ray = Ray::new(Vec3::new(0.25, 0.5, from), Vec3::new(0.0, 0.0, -from));
+            let hit = ray.triangle(&TRIANGLE, f32::INFINITY).expect("the ray goes through the triangle");
+            assert_eq!(hit, TriangleHit { t: 1.0, u: 0.25, v: 0.5, front });
+        }
+    }
+
+    #[test]
+    fn distances_stay_within_the_interval() {
+        let ray = Ray::new(Vec3::new(0.25, 0.25, 1.0), Vec3::NEG_Z);
+        assert!(ray.triangle(&TRIANGLE, 0.999).is_none());
+        assert!(ray.triangle(&TRIANGLE, 1.0).is_some());
+        assert!(Ray::new(Vec3::new(0.25, 0.25, -1.0), Vec3::NEG_Z).triangle(&TRIANGLE, 9.0).is_none());
+        assert!(Ray::new(Vec3::new(0.25, 0.25, 0.0), Vec3::NEG_Z).triangle(&TRIANGLE, 9.0).is_none());
+    }
+
+    #[test]
+    fn triangles_without_area_or_with_nan_are_never_met() {
+        let ray = Ray::new(Vec3::new(0.25, 0.0, 1.0), Vec3::NEG_Z);
+        for broken in [
+            [Vec3::ZERO, Vec3::X, Vec3::X],
+            [Vec3::ZERO, Vec3::X, Vec3::X * 2.0],
+            [Vec3::ZERO; 3],
+            [Vec3::NAN, Vec3::X, Vec3::Y],
+            [Vec3::ZERO, Vec3::INFINITY, Vec3::Y],
+        ] {
+            assert_eq!(ray.triangle(&broken, f32::INFINITY), None, "{broken:?}");
+        }
+    }
+}

@@ -1,0 +1,286 @@
+//! Waves: all rays of a run of pixels at one depth of the ray tree, traced and shaded together.
+//!
+//! A tile is cut into runs of pixels of a few thousand samples, so that a wave's data stays in the cache. For each run:
+//! camera rays are wave 0; each wave is traced, its hits are grouped by material and shaded in batches, and what they
+//! mirror and refract becomes the next wave. When no rays are left, radiance flows back from children to parents, and
+//! the nodes enter the [`SampleBuffer`]. Every number depends on its own sample's ray tree alone, so that no tile size,
+//! thread count or order can change a bit.
+
+use std::ops::Range;
+use std::time::Instant;
+
+use super::ray_tree::{Run, TreeNode, WaveHit, WaveRay};
+use super::surface::Surface;
+use super::triangle::Ray;
+use super::world::World;
+use crate::math::Vec3;
+use crate::plan::Plan;
+use crate::sample::position::SamplePositions;
+use crate::sample::{PixelRect, SampleBuffer, SampleBufferBuilder, SampleColor};
+use crate::scene::Scene;
+use crate::scene::settings::{Background, RayKinds};
+use crate::shade::batch::{HitBatch, OutputBatch};
+use crate::shade::{Lighting, PathKind, ShadeErrors, Shaders, Shading};
+
+/// Samples of a run of pixels that are traced together.
+const RUN_SAMPLES: usize = 4096;
+/// Most surfaces of opacity 0 that a ray passes before it is taken to leave the scene.
+const MOST_INVISIBLE: u32 = 256;
+
+/// Rays traced, by kind, for `--stats`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct RayCounts {
+    /// From the camera, continuations through invisible surfaces included.
+    pub camera: u64,
+    /// Towards lights.
+    pub shadow: u64,
+    /// Mirrored.
+    pub reflection: u64,
+    /// Refracted or straight on through a see-through surface.
+    pub refraction: u64,
+}
+
+impl std::ops::AddAssign for RayCounts {
+    fn add_assign(&mut self, other: Self) {
+        self.camera += other.camera;
+        self.shadow += other.shadow;
+        self.reflection += other.reflection;
+        self.refraction += other.refraction;
+    }
+}
+
+/// What a tile of rays came to.
+#[derive(Debug)]
+pub struct TracedTile {
+    /// The samples.
+    pub samples: SampleBuffer,
+    /// Rays traced.
+    pub rays: RayCounts,
+    /// Hits shaded, by material.
+    pub hits: Vec<u64>,
+    /// Seconds spent in shaders, by material.
+    pub shade_seconds: Vec<f64>,
+    /// Seconds spent on all of it.
+    pub seconds: f64,
+}
+
+/// Traces tiles. Shared by all threads.
+pub struct TileTracer<'a> {
+    pub(super) scene: &'a Scene,
+    pub(super) plan: &'a Plan,
+    pub(super) world: &'a World,
+    pub(super) lighting: &'a Lighting,
+    positions: SamplePositions,
+    transparent: bool,
+    /// Width of a pixel's cone at the camera, and how much it widens per unit of distance.
+    pub(super) cone: (f32, f32),
+}
+
+/// A thread's own memory and script engine.
+pub struct TraceContext<'a> {
+    pub(super) shading: Shading<'a>,
+    /// Run-time errors of scripts so far.
+    pub errors: ShadeErrors,
+    /// The one evaluation of each constant material.
+    pub(super) constants: Vec<Option<OutputBatch>>,
+    pub(super) hits: HitBatch,
+    pub(super) outputs: OutputBatch,
+    run: Run,
+}
+
+impl<'a> TraceContext<'a> {
+    /// A context for one thread at a time.
+    #[must_use]
+    pub fn new(scene: &'a Scene, shaders: &'a Shaders) -> Self {
+        Self {
+            shading: Shading::new(scene, shaders),
+            errors: ShadeErrors::default(),
+            constants: vec![None; scene.materials().len()],
+            hits: HitBatch::default(),
+            outputs: OutputBatch::default(),
+            run: Run::default(),
+        }
+    }
+
+    /// Script evaluations so far.
+    #[must_use]
+    pub fn evaluations(&self) -> u64 {
+        self.shading.evaluations()
+    }
+}
+
+impl<'a> TileTracer<'a> {
+    /// A tracer for a scene under its plan.
+    #[must_use]
+    pub fn new(scene: &'a Scene, plan: &'a Plan, world: &'a World, lighting: &'a Lighting) -> Self {
+        let settings = scene.render();
+        let (angle, width) = scene.camera().pixel_spread(settings.size[1]);
+        Self {
+            scene,
+            plan,
+            world,
+            lighting,
+            positions: SamplePositions::new(settings.samples, settings.seed),
+            transparent: settings.background == Background::Transparent,
+            cone: (width, angle),
+        }
+    }
+
+    /// Traces and shades all samples of a rectangle of pixels.
+    pub fn trace(&self, rect: PixelRect, context: &mut TraceContext<'_>) -> TracedTile {
+        let start = Instant::now();
+        let materials = self.scene.materials().len();
+        let mut work =
+            Work { rays: RayCounts::default(), hits: vec![0; materials], shade_seconds: vec![0.0; materials] };
+        let mut samples = SampleBufferBuilder::new(rect, &self.plan.layout);
+        let per_pixel = self.plan.layout.samples_per_pixel as usize;
+        let run_pixels = (RUN_SAMPLES / per_pixel).max(1);
+        let mut first = 0;
+        while first < rect.pixels() {
+            let run = first..(first + run_pixels).min(rect.pixels());
+            self.trace_run(rect, run.clone(), &mut samples, context, &mut work);
+            first = run.end;
+        }
+        let samples = samples.finish();
+        let Work { rays, hits, shade_seconds } = work;
+        TracedTile { samples, rays, hits, shade_seconds, seconds: start.elapsed().as_secs_f64() }
+    }
+
+    fn trace_run(
+        &self,
+        rect: PixelRect,
+        pixels: Range<usize>,
+        samples: &mut SampleBufferBuilder,
+        context: &mut TraceContext<'_>,
+        work: &mut Work,
+    ) {
+        let mut run = std::mem::take(&mut context.run);
+        run.clear();
+        let offsets = self.start(rect, pixels, &mut run);
+        while !run.next.is_empty() {
+            let wave = std::mem::take(&mut run.next);
+            self.run_wave(wave, &mut run, context, work);
+        }
+        run.gather_radiance();
+        self.store(&run, &offsets, samples);
+        context.run = run;
+    }
+
+    /// Makes the camera rays of a run of pixels the next wave; returns where in their pixels they start.
+    fn start(&self, rect: PixelRect, pixels: Range<usize>, run: &mut Run) -> Vec<[f32; 2]> {
+        let size = self.scene.render().size;
+        let per_pixel = self.plan.layout.samples_per_pixel;
+        let count = pixels.len() * per_pixel as usize;
+        let mut offsets = Vec::with_capacity(count);
+        for index in pixels {
+            let width = rect.width() as usize;
+            let pixel = [rect.x0 + (index % width) as i32, rect.y0 + (index / width) as i32];
+            for sample in 0..per_pixel {
+                let offset = self.positions.offset(pixel, sample);
+                let (origin, direction) = self.scene.camera().ray(size, pixel, offset);
+                let node = run.nodes.len() as u32;
+                run.next.push(WaveRay { origin, direction, node, covered: 0.0, passed: 0 });
+                run.nodes.push(TreeNode::root(index as u32 * per_pixel + sample, self.cone.0));
+                offsets.push(offset);
+            }
+        }
+        run.positions.resize(if self.plan.layout.position { count } else { 0 }, Vec3::ZERO);
+        run.aovs.resize(count * self.plan.layout.aovs, Vec3::ZERO);
+        offsets
+    }
+
+    /// Traces and shades one wave; what it mirrors and refracts becomes the next.
+    fn run_wave(&self, mut wave: Vec<WaveRay>, run: &mut Run, context: &mut TraceContext<'_>, work: &mut Work) {
+        // Rays that met something of opacity 0 go round again, for the same node.
+        while !wave.is_empty() {
+            let mut hits = self.find_hits(&wave, run, work);
+            wave.clear();
+            // Stable, so that rays stay in the order of their samples within a material.
+            hits.sort_by_key(|hit| hit.material);
+            for group in hits.chunk_by(|a, b| a.material == b.material) {
+                self.shade_group(group, run, context, work);
+            }
+            std::mem::swap(&mut wave, &mut run.again);
+        }
+    }
+
+    fn find_hits(&self, wave: &[WaveRay], run: &mut Run, work: &mut Work) -> Vec<WaveHit> {
+        let mut hits = Vec::with_capacity(wave.len());
+        for wave_ray in wave {
+            let node = &mut run.nodes[wave_ray.node as usize];
+            let kind = match node.kind {
+                PathKind::Camera | PathKind::Shadow => {
+                    work.rays.camera += 1;
+                    RayKinds::CAMERA
+                }
+                PathKind::Reflection => {
+                    work.rays.reflection += 1;
+                    RayKinds::REFLECTION
+                }
+                PathKind::Refraction => {
+                    work.rays.refraction += 1;
+                    RayKinds::REFRACTION
+                }
+            };
+            let ray = Ray::new(wave_ray.origin, wave_ray.direction);
+            let found =
+                if wave_ray.passed < MOST_INVISIBLE { self.world.closest(&ray, kind, f32::INFINITY) } else { None };
+            match found {
+                Some(hit) => {
+                    let surface = Surface::new(self.world, &ray, &hit);
+                    let distance = wave_ray.covered + hit.t;
+                    hits.push(WaveHit {
+                        ray: *wave_ray,
+                        hit,
+                        surface,
+                        material: self.world.material(&hit),
+                        distance,
+                        depth: node.length_before + distance,
+                    });
+                }
+                None => {
+                    node.radiance = self.lighting.background(wave_ray.direction);
+                    node.alpha = if self.transparent { 0.0 } else { 1.0 };
+                }
+            }
+        }
+        hits
+    }
+
+    /// Hands the nodes of a run to the sample buffer.
+    fn store(&self, run: &Run, offsets: &[[f32; 2]], samples: &mut SampleBufferBuilder) {
+        let layout = &self.plan.layout;
+        let mut extras = Vec::with_capacity(layout.aovs);
+        for (root, offset) in offsets.iter().enumerate() {
+            let node = &run.nodes[root];
+            let color = SampleColor { color: node.radiance.to_array(), alpha: node.alpha };
+            samples.set_sample(node.sample, *offset, color, node.attributes.shader);
+            if layout.position || layout.aovs > 0 {
+                let position = run.positions.get(root).copied().unwrap_or_default();
+                extras.clear();
+                extras.extend(run.aovs[root * layout.aovs..(root + 1) * layout.aovs].iter().map(|aov| aov.to_array()));
+                samples.set_extras(node.sample, position.to_array(), &extras);
+            }
+        }
+        // Without a line pass nobody asks what mirrors and glass show.
+        let kept = if self.plan.lines.is_some() { run.nodes.len() } else { offsets.len() };
+        for node in &run.nodes[..kept] {
+            let mut attributes = node.attributes;
+            attributes.contribution = (Vec3::from(attributes.throughput) * node.radiance).to_array();
+            samples.push(node.path, node.sample, attributes);
+        }
+    }
+}
+
+/// Counters of one tile.
+pub(super) struct Work {
+    pub rays: RayCounts,
+    pub hits: Vec<u64>,
+    pub shade_seconds: Vec<f64>,
+}
+
+/// A row of an output column; the default where the column is absent.
+#[inline]
+pub(super) fn value<T: Copy>(column: &[T], row: usize, default: T) -> T {
+    column.get(row).copied().unwrap_or(default)
+}

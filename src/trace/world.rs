@@ -1,0 +1,218 @@
+//! The scene as rays see it: a hierarchy over objects, each a mesh with its own hierarchy and a transform.
+
+use std::sync::Arc;
+
+use obvhs::aabb::Aabb;
+use rayon::prelude::*;
+
+use super::tree::{BoxTree, MeshTree};
+use super::triangle::Ray;
+use crate::math::{DVec3, Mat3, Vec3, Vec3A};
+use crate::scene::Scene;
+use crate::scene::ids::{MaterialId, ObjectId};
+use crate::scene::mesh::Mesh;
+use crate::scene::settings::RayKinds;
+
+/// Where a ray meets an object.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit {
+    /// Distance in lengths of the ray's direction.
+    pub t: f32,
+    /// The object.
+    pub object: ObjectId,
+    /// Index into the triangles of its mesh.
+    pub triangle: u32,
+    /// Barycentric weights of the triangle's second and third vertex.
+    pub barycentric: [f32; 2],
+    /// Whether the front of the triangle was met. The side that is the front in the mesh's own space stays it under
+    /// mirroring transforms, as glTF has it.
+    pub front: bool,
+}
+
+/// An object, placed relative to the camera.
+#[derive(Clone, Debug)]
+pub struct PlacedObject {
+    /// Its mesh.
+    pub mesh: Arc<Mesh>,
+    /// Materials by slot.
+    pub materials: Vec<MaterialId>,
+    /// Linear part of the transform into the world.
+    pub world_from_object: Mat3,
+    /// Where the object's origin lies, relative to the camera.
+    pub translation: Vec3,
+    object_from_world: Mat3,
+    /// Inverse transpose of the linear part, for normals.
+    pub normal_from_object: Mat3,
+    visible_to: RayKinds,
+    tree: Arc<MeshTree>,
+    /// By slot: whether the back side is invisible to camera, reflection and refraction rays.
+    single_sided: Vec<bool>,
+}
+
+impl PlacedObject {
+    /// The material slot of a triangle.
+    #[inline]
+    #[must_use]
+    pub fn slot(&self, triangle: u32) -> usize {
+        self.mesh.slots.get(triangle as usize).map_or(0, |slot| usize::from(*slot))
+    }
+
+    fn to_object(&self, ray: &Ray) -> Ray {
+        Ray::new(self.object_from_world * (ray.origin - self.translation), self.object_from_world * ray.direction)
+    }
+}
+
+/// The scene as rays see it. Everything is relative to the camera's position.
+#[derive(Clone, Debug)]
+pub struct World {
+    tree: BoxTree,
+    /// By object id. Objects that no ray can meet (no triangles, singular transform) are not in the tree.
+    objects: Vec<PlacedObject>,
+    /// The camera's position in the world.
+    pub origin: DVec3,
+}
+
+impl World {
+    /// Builds all hierarchies, in parallel over the meshes.
+    ///
+    /// `transmissive` tells of each material whether light may pass through it: such surfaces are seen from behind
+    /// even if they are single-sided, or a glass body would have no far side.
+    #[must_use]
+    pub fn new(scene: &Scene, transmissive: &[bool]) -> Self {
+        let origin = scene.camera().position;
+        let trees: Vec<Arc<MeshTree>> = scene.meshes().par_iter().map(|mesh| Arc::new(MeshTree::new(mesh))).collect();
+        let objects: Vec<PlacedObject> = scene
+            .objects()
+            .iter()
+            .map(|object| {
+                let linear = object.world_from_object.matrix3;
+                let inverse = linear.inverse();
+                PlacedObject {
+                    mesh: Arc::clone(&scene.meshes()[object.mesh.index()]),
+                    materials: object.materials.clone(),
+                    world_from_object: linear.as_mat3(),
+                    translation: (object.world_from_object.translation - origin).as_vec3(),
+                    object_from_world: inverse.as_mat3(),
+                    normal_from_object: inverse.transpose().as_mat3(),
+                    visible_to: object.visible_to,
+                    tree: Arc::clone(&trees[object.mesh.index()]),
+                    single_sided: object
+                        .materials
+                        .iter()
+                        .map(|id| !scene.materials()[id.index()].double_sided && !transmissive[id.index()])
+                        .collect(),
+                }
+            })
+            .collect();
+        let (ids, boxes): (Vec<u32>, Vec<Aabb>) = objects
+            .iter()
+            .enumerate()
+            .filter(|(_, object)| object.object_from_world.is_finite() && object.world_from_object.is_finite())
+            .filter_map(|(id, object)| Some((id as u32, world_box(object)?)))
+            .unzip();
+        let mut tree = BoxTree::new(&boxes);
+        for place in &mut tree.order {
+            *place = ids[*place as usize];
+        }
+        Self { tree, objects, origin }
+    }
+
+    /// An object by id.
+    #[must_use]
+    pub fn object(&self, id: ObjectId) -> &PlacedObject {
+        &self.objects[id.index()]
+    }
+
+    /// The material at a hit.
+    #[must_use]
+    pub fn material(&self, hit: &Hit) -> MaterialId {
+        let object = self.object(hit.object);
+        object.materials[object.slot(hit.triangle)]
+    }
+
+    /// The closest hit of a ray of one kind within `t_max`. Of hits at exactly the same distance, the one with the
+    /// lowest object id and then the lowest triangle counts.
+    #[must_use]
+    pub fn closest(&self, ray: &Ray, kind: RayKinds, t_max: f32) -> Option<Hit> {
+        let mut best: Option<Hit> = None;
+        self.each_hit(ray, kind, t_max, |hit, t_max| {
+            let closer =
+                best.is_none_or(|best| (hit.t, hit.object, hit.triangle) < (best.t, best.object, best.triangle));
+            if closer {
+                *t_max = hit.t;
+                best = Some(hit);
+            }
+            true
+        });
+        best
+    }
+
+    /// Looks for something that blocks a shadow ray within `t_max`. `opaque` tells of a material whether it surely
+    /// blocks; hits on others are collected in `passed`, nearest first. Returns whether the ray is surely blocked
+    /// (`passed` is then incomplete).
+    #[must_use]
+    pub fn blocked(&self, ray: &Ray, t_max: f32, opaque: impl Fn(MaterialId) -> bool, passed: &mut Vec<Hit>) -> bool {
+        passed.clear();
+        let mut blocked = false;
+        self.each_hit(ray, RayKinds::SHADOW, t_max, |hit, _| {
+            blocked = opaque(self.material(&hit));
+            if !blocked {
+                passed.push(hit);
+            }
+            !blocked
+        });
+        if !blocked {
+            passed.sort_by(|a, b| a.t.total_cmp(&b.t).then((a.object, a.triangle).cmp(&(b.object, b.triangle))));
+        }
+        blocked
+    }
+
+    /// Shows each hit to `accept`, roughly front to back; it may lower `t_max` and returns whether to go on.
+    #[inline]
+    fn each_hit(&self, ray: &Ray, kind: RayKinds, t_max: f32, mut accept: impl FnMut(Hit, &mut f32) -> bool) {
+        let culls = kind != RayKinds::SHADOW;
+        let mut t_max = t_max;
+        self.tree.traverse(ray, &mut t_max, |places, t_max| {
+            for id in &self.tree.order[places] {
+                let object = &self.objects[*id as usize];
+                if !object.visible_to.contains(kind) {
+                    continue;
+                }
+                let mut go_on = true;
+                object.tree.intersect(&object.to_object(ray), t_max, |triangle, hit, t_max| {
+                    if culls && !hit.front && object.single_sided[object.slot(triangle)] {
+                        return true;
+                    }
+                    let hit = Hit {
+                        t: hit.t,
+                        object: ObjectId(*id),
+                        triangle,
+                        barycentric: [hit.u, hit.v],
+                        front: hit.front,
+                    };
+                    go_on = accept(hit, t_max);
+                    go_on
+                });
+                if !go_on {
+                    return false;
+                }
+            }
+            true
+        });
+    }
+}
+
+/// The box of an object, relative to the camera, grown by the rounding of its transform.
+fn world_box(object: &PlacedObject) -> Option<Aabb> {
+    let (low, high) = object.tree.bounds()?;
+    let center = (low + high) * 0.5;
+    let half = (high - low) * 0.5;
+    let m = object.world_from_object;
+    let place = m * center + object.translation;
+    let extent = Mat3::from_cols(m.x_axis.abs(), m.y_axis.abs(), m.z_axis.abs()) * half;
+    // A dozen roundings of values no larger than these.
+    let slack = (place.abs() + extent + object.translation.abs() + (m * center).abs()) * (16.0 * f32::EPSILON);
+    let extent = extent + slack + Vec3::splat(f32::MIN_POSITIVE);
+    let bounds = Aabb::new(Vec3A::from(place - extent), Vec3A::from(place + extent));
+    (bounds.min.is_finite() && bounds.max.is_finite()).then_some(bounds)
+}

@@ -1,0 +1,198 @@
+//! The search against the oracle, on random samples.
+
+use proptest::prelude::*;
+use tusche::line::{LineBuffer, Method, Rules, SeenLine};
+use tusche::math::Vec3;
+use tusche::sample::{HandMadeSample, Node, NodePath, PixelRect, SampleBuffer, SampleColor};
+use tusche::scene::settings::{Composition, LineSettings, RayKinds};
+
+use super::picture::{Tiles, layout};
+
+/// A sample with its nodes.
+#[derive(Clone, Debug)]
+struct Sample {
+    offset: [f32; 2],
+    color: [f32; 3],
+    nodes: Vec<(NodePath, Node)>,
+}
+
+#[derive(Clone)]
+struct Case {
+    rect: PixelRect,
+    samples_per_pixel: u32,
+    tiles: [i32; 2],
+    settings: LineSettings,
+    samples: Vec<Sample>,
+}
+
+fn few<T: Clone + std::fmt::Debug + 'static>(values: impl Into<Vec<T>>) -> impl Strategy<Value = T> + Clone {
+    proptest::sample::select(values.into())
+}
+
+fn node() -> impl Strategy<Value = Node> {
+    let normals = [[0.0, 0.0, 1.0], [0.0, 0.0, -1.0], [0.6, 0.0, 0.8], [0.6, 0.0, 0.800_000_1], [1.0, 2.0, -3.0]];
+    let unit = || few([0.0, 0.25, 0.5, 0.500_000_06, 1.0]);
+    (
+        (0..3u32, 1..3u32, [unit(), unit()], few(normals), [unit(), unit(), unit()]),
+        // Equal depths must be common: they are what ties are about.
+        prop_oneof![3 => few([1.0, 2.0, 3.0]), 1 => 1.0..3.0f32],
+        few([0.0, -1.0, 0.1, 0.5, 1.0, 2.5, 4.0, 1e9, f32::NAN]),
+        few([0, 0, 0, 1, -1, i32::MIN, i32::MAX]),
+        ([unit(), unit(), unit()], [unit(), unit(), unit()], [unit(), unit(), unit()]),
+    )
+        .prop_map(|((object, shader, uv, normal, feature), depth, line_width, priority, colors)| Node {
+            object,
+            shader,
+            uv,
+            normal,
+            feature,
+            depth,
+            line_color: colors.0,
+            line_width,
+            priority,
+            throughput: colors.1,
+            contribution: colors.2,
+        })
+}
+
+/// Random pixels as a renderer makes them: mostly one of a few nodes, so that some blocks are uniform.
+fn sample() -> impl Strategy<Value = Sample> {
+    let camera = NodePath::CAMERA;
+    let deeper = [camera.reflected(), camera.refracted(), camera.reflected().refracted()];
+    (
+        [prop_oneof![few([0.0, 0.5, 1.0]), 0.0..1.0f32], prop_oneof![few([0.0, 0.5, 1.0]), 0.0..1.0f32]],
+        [0.0..1.0f32, 0.0..1.0f32, 0.0..1.0f32],
+        node(),
+        proptest::collection::btree_map(few(deeper), node(), 0..3),
+    )
+        .prop_map(move |(offset, color, first, deeper)| Sample {
+            offset,
+            color,
+            nodes: [(camera, first)].into_iter().chain(deeper).collect(),
+        })
+}
+
+fn settings() -> impl Strategy<Value = LineSettings> {
+    let threshold = |values: &[f32]| few(values.iter().map(|&t| Some(t)).chain([None]).collect::<Vec<_>>());
+    (
+        (any::<bool>(), any::<bool>(), threshold(&[0.0, 0.25, 0.4]), threshold(&[0.0, 1.0, 90.0, 179.9, 180.0])),
+        (threshold(&[0.0, 0.25, 0.3]), few([0.0, 0.5, 1.0]), any::<bool>(), few([1.0, 3.0, 5.0, 20.0])),
+        (any::<bool>(), any::<bool>(), 0..8u8),
+    )
+        .prop_map(|((object, shader, uv, normal), (feature, min_width, width_compensation, max_width), rest)| {
+            LineSettings {
+                object,
+                shader,
+                uv,
+                normal,
+                feature,
+                min_width,
+                width_compensation,
+                max_width,
+                tint: rest.0,
+                compose: if rest.1 { Composition::Replace } else { Composition::Throughput },
+                // Mostly all: 3 of 8 leave kinds out.
+                paths: if rest.2 < 3 { RayKinds::from_bits_truncate(rest.2 + 1) } else { RayKinds::all() },
+                enabled: true,
+                color: Vec3::ZERO,
+                width: 2.0,
+            }
+        })
+}
+
+fn case() -> impl Strategy<Value = Case> {
+    ((-20..20i32, -20..20i32, 1..14i32, 1..14i32), 1..9u32, [1..16i32, 1..16i32], settings()).prop_flat_map(
+        |((x0, y0, width, height), samples_per_pixel, tiles, settings)| {
+            let rect = PixelRect { x0, y0, x1: x0 + width, y1: y0 + height };
+            let count = rect.pixels() * samples_per_pixel as usize;
+            // A palette of samples, and which pixels take which: runs of equal ones make uniform blocks.
+            let palette = proptest::collection::vec(sample(), 1..8);
+            let choice = proptest::collection::vec((0..8usize, 1..40usize), count.min(60));
+            let offsets = proptest::collection::vec([0.0..1.0f32, 0.0..1.0f32], count);
+            (palette, choice, offsets, any::<bool>()).prop_map(move |(palette, choice, offsets, jitter)| {
+                let runs = choice.iter().flat_map(|&(entry, length)| std::iter::repeat_n(entry, length)).cycle();
+                let samples = runs
+                    .zip(&offsets)
+                    .map(|(entry, &offset)| {
+                        let sample = palette[entry % palette.len()].clone();
+                        if jitter { Sample { offset, ..sample } } else { sample }
+                    })
+                    .collect();
+                Case { rect, samples_per_pixel, tiles, settings: settings.clone(), samples }
+            })
+        },
+    )
+}
+
+/// In few words: proptest prints a case as often as it shrinks.
+impl std::fmt::Debug for Case {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { rect, samples_per_pixel, tiles, settings, samples } = self;
+        writeln!(f, "{rect:?}, {samples_per_pixel} samples, tiles of {tiles:?}\n{settings:?}")?;
+        samples.iter().try_for_each(|sample| writeln!(f, "{sample:?}"))
+    }
+}
+
+impl Case {
+    fn cut(&self, side: i32) -> Tiles {
+        let rules = Rules::new(&self.settings, self.samples_per_pixel);
+        Tiles::new(self.rect, side, &rules, |tile| self.buffer(tile))
+    }
+
+    fn buffer(&self, tile: PixelRect) -> SampleBuffer {
+        let mut samples = Vec::new();
+        for y in tile.y0..tile.y1 {
+            for x in tile.x0..tile.x1 {
+                let pixel = (y - self.rect.y0) as usize * self.rect.width() as usize + (x - self.rect.x0) as usize;
+                let first = pixel * self.samples_per_pixel as usize;
+                samples.extend(self.samples[first..first + self.samples_per_pixel as usize].iter().map(|sample| {
+                    let color = SampleColor { color: sample.color, alpha: 1.0 };
+                    HandMadeSample { offset: sample.offset, color, nodes: &sample.nodes }
+                }));
+            }
+        }
+        SampleBuffer::from_samples(tile, &layout(self.samples_per_pixel, self.settings.max_width), &samples)
+    }
+
+    /// All lines of the picture with the pixel and number of their samples, however it was cut.
+    fn by_place(&self, lines: &[LineBuffer]) -> Vec<([i32; 2], u32, Bits)> {
+        let mut all: Vec<_> = lines
+            .iter()
+            .flat_map(|lines| {
+                assert!(lines.samples.is_sorted());
+                lines.samples.iter().zip(&lines.lines).map(|(sample, line)| {
+                    let pixel = sample / self.samples_per_pixel;
+                    let (x, y) = (pixel % lines.rect.width(), pixel / lines.rect.width());
+                    let pixel = [lines.rect.y0 + y as i32, lines.rect.x0 + x as i32];
+                    (pixel, sample % self.samples_per_pixel, bits(line))
+                })
+            })
+            .collect();
+        all.sort();
+        all
+    }
+}
+
+/// A line as numbers that compare bit by bit.
+type Bits = (Vec<u32>, String);
+
+fn bits(line: &SeenLine) -> Bits {
+    let floats = line.color.iter().chain(&line.lined).chain([&line.alpha]).map(|x| x.to_bits()).collect();
+    (floats, format!("{} {:?} {:?} {}", line.path, line.fired, line.neighbor, line.own))
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 400, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn the_search_is_the_oracle_and_tiles_do_not_matter(case in case()) {
+        let whole = case.cut(64);
+        let expected = case.by_place(&whole.lines(Method::Brute));
+        prop_assert_eq!(&case.by_place(&whole.lines(Method::Exact)), &expected, "search, one tile");
+        for side in case.tiles {
+            let cut = case.cut(side);
+            prop_assert_eq!(&case.by_place(&cut.lines(Method::Brute)), &expected, "brute, tiles of {}", side);
+            prop_assert_eq!(&case.by_place(&cut.lines(Method::Exact)), &expected, "search, tiles of {}", side);
+        }
+    }
+}

@@ -1,0 +1,7 @@
+//! The line pass: oracle against text, search against oracle, both against areas that are known.
+
+mod area;
+mod buffer;
+mod equal;
+pub mod picture;
+mod seen;

@@ -1,0 +1,72 @@
+//! Determinism: no thread count, tile size, search method, crop or run changes a bit of a picture.
+
+use tusche::film::Layer;
+use tusche::line::Method;
+use tusche::render::RenderOptions;
+use tusche::sample::PixelRect;
+use tusche::scene::Scene;
+
+use crate::common::{render_with, scene_from, shipped_scenes};
+
+const LAYERS: [Layer; 5] = [Layer::Rgba, Layer::Color, Layer::Line, Layer::Depth, Layer::Object];
+
+/// A shipped scene, small and quick.
+fn small(path: &std::path::Path) -> Scene {
+    let scene = scene_from(&std::fs::read_to_string(path).expect("shipped scenes can be read"));
+    let mut builder = scene.into_builder();
+    let [width, height] = builder.render.size;
+    builder.render.size = [72, (72 * height / width).max(1)];
+    builder.render.samples = 4;
+    builder.build().unwrap_or_else(|faults| panic!("{faults}"))
+}
+
+#[test]
+fn threads_tiles_and_runs_change_no_bit() {
+    for (name, path) in shipped_scenes() {
+        let scene = small(&path);
+        let bits = |threads, tile| {
+            let options = RenderOptions { threads, tile, ..RenderOptions::default() };
+            render_with(&scene, &LAYERS, &options).0.bits()
+        };
+        let reference = bits(1, 32);
+        for (threads, tile) in [(1, 32), (2, 8), (4, 32), (2, 100)] {
+            assert!(bits(threads, tile) == reference, "{name}: {threads} threads, tiles of {tile}");
+        }
+    }
+}
+
+#[test]
+fn the_exact_search_draws_what_brute_force_draws_on_every_scene() {
+    for (name, path) in shipped_scenes() {
+        let scene = small(&path);
+        let bits = |method| {
+            let options = RenderOptions { method, ..RenderOptions::default() };
+            render_with(&scene, &LAYERS, &options).0.bits()
+        };
+        assert!(bits(Method::Exact) == bits(Method::Brute), "{name}");
+    }
+}
+
+#[test]
+fn crops_are_pieces_of_the_whole_picture() {
+    for (name, path) in shipped_scenes() {
+        let scene = small(&path);
+        let whole = render_with(&scene, &LAYERS, &RenderOptions::default()).0;
+        for crop in [
+            PixelRect { x0: 0, y0: 0, x1: 20, y1: 11 },
+            PixelRect { x0: 31, y0: 9, x1: 57, y1: 30 },
+            PixelRect { x0: 71, y0: 5, x1: 72, y1: 6 },
+        ] {
+            let options = RenderOptions { crop: Some(crop), tile: 16, ..RenderOptions::default() };
+            let piece = render_with(&scene, &LAYERS, &options).0;
+            for channel in 0..whole.channels.len() {
+                for y in crop.y0..crop.y1.min(whole.height as i32) {
+                    for x in crop.x0..crop.x1 {
+                        let [a, b] = [&whole, &piece].map(|p| p.at(channel, x as usize, y as usize).to_bits());
+                        assert_eq!(a, b, "{name}: channel {channel} at {x}, {y}");
+                    }
+                }
+            }
+        }
+    }
+}
