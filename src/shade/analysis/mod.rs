@@ -140,7 +140,10 @@ fn walk_surface(walker: &mut Walker, ast: &rhai::AST, params: &Params) -> Flow<O
     };
     match returned.shape {
         Shape::Record(record) => Ok(Some(record)),
-        _ => walker.give_up(start, "what `surface` returns is not always a record with known keys and so"),
+        _ => {
+            let end = function.body.last().map_or(start, rhai::Stmt::position);
+            walker.give_up(end, "what `surface` returns, which is not always a record with known keys,")
+        }
     }
 }
 

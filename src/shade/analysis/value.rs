@@ -173,9 +173,11 @@ impl Shape {
     pub fn range(&self) -> Option<Interval> {
         match self {
             Self::Vector(vector) => Some(vector.hull()),
-            // `as` rounds to nearest, which may be inwards.
-            Self::Int(low, high) if *low < -EXACT_INT || *high > EXACT_INT => {
-                Some(Interval::new((*low as f32).next_down(), (*high as f32).next_up()))
+            Self::Int(low, high) => {
+                // `as` rounds to nearest, which may be inwards.
+                let is_rounded = |n: i64| n.unsigned_abs() > EXACT_INT as u64;
+                let outwards = |n: i64, step: fn(f32) -> f32| if is_rounded(n) { step(n as f32) } else { n as f32 };
+                Some(Interval::new(outwards(*low, f32::next_down), outwards(*high, f32::next_up)))
             }
             _ => self.number(),
         }
