@@ -504,3 +504,29 @@ fn text_is_followed_while_constant() {
          roughness: always, [0.5, 0.5], constant",
     );
 }
+
+/// Scripts that would keep a walk busy for ever, or fill the memory or the stack.
+#[test]
+fn hostile_scripts_end() {
+    let nested =
+        |depth: usize, inner: &str| format!("{}{inner}{}", "if hit.front_facing { ".repeat(depth), " }".repeat(depth));
+    let doubling: String = (1..40).map(|i| format!("fn f{i}(x) {{ f{}(x) + f{0}(x) }} ", i - 1)).collect();
+    let scripts = [
+        "let r = #{}; for i in 0..60 { r = #{ a: r, b: r }; } if hit.front_facing { r = #{ a: 1 }; } r".to_owned(),
+        "let r = []; for i in 0..60 { r = [r, r, hit]; } #{ roughness: r }".to_owned(),
+        "let r = #{}; while hit.front_facing { r = #{ a: r, b: r }; } r".to_owned(),
+        "let t = \"x\"; for i in 0..64 { t += t; } #{ roughness: if t == \"y\" { 1 } else { 2 } }".to_owned(),
+        "let n = 0; for a in 0..60 { for b in 0..60 { for c in 0..60 { for d in 0..60 { n += 1; } } } } #{ priority: n }".to_owned(),
+        "loop { } #{}".to_owned(),
+        "let i = 0; while i >= 0 { i += 1; } #{ priority: i }".to_owned(),
+        format!("let x = 0; {} #{{ priority: x }}", nested(40, "x += 1;")),
+        format!("{doubling} fn f0(x) {{ x }} fn surface(hit, p) {{ #{{ roughness: f39(hit.time) }} }}"),
+        format!("fn f(x) {{ {} f(x) }} fn surface(hit, p) {{ f(hit) }}", "if x.front_facing { x.time } else { 1.0 } + ".repeat(20)),
+    ];
+    for script in scripts {
+        let script = if script.starts_with("fn ") { script } else { format!("fn surface(hit, p) {{ {script} }}") };
+        let started = std::thread::Builder::new().stack_size(2 << 20).spawn(move || analysis(&script, &[]));
+        let found = started.expect("threads can be started").join().expect("the analysis does not panic");
+        assert!(found.outputs.len() > 1);
+    }
+}

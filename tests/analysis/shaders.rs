@@ -115,8 +115,8 @@ fn cel() {
         &shipped("cel", &[]),
         "inputs: irradiance
          line_color: always, [0.048, 0.105000004], constant
-         line_width: always, [1.999999, 2.8], from irradiance
-         color: always, [-3.3795834e-7, 1.2150009], from irradiance",
+         line_width: always, [2.0, 2.8], from irradiance
+         color: always, [0.04499985, 0.90000093], from irradiance",
     );
 }
 

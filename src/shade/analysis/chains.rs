@@ -72,21 +72,19 @@ impl Walker<'_> {
     fn steps<'e>(&mut self, expression: &'e Expr) -> Flow<(&'e Expr, Vec<Step<'e>>)> {
         let mut steps = Vec::new();
         let mut root = None;
-        let mut link = expression;
-        loop {
-            let (Expr::Dot(sides, flags, position) | Expr::Index(sides, flags, position)) = link else { break };
+        let mut rest = Some(expression);
+        while let Some(link @ (Expr::Dot(sides, flags, position) | Expr::Index(sides, flags, position))) = rest {
             root.get_or_insert(&sides.lhs);
-            let is_index = matches!(link, Expr::Index(..));
-            let goes_on = matches!(sides.rhs, Expr::Dot(..) | Expr::Index(..)) && !flags.contains(ASTFlags::BREAK);
+            // The chain goes on inside the right side, unless that is a chain of its own, as in `a[b.c]`.
             let (item, next) = match &sides.rhs {
-                Expr::Dot(next, ..) | Expr::Index(next, ..) if goes_on => (&next.lhs, Some(&sides.rhs)),
+                next @ (Expr::Dot(inner, ..) | Expr::Index(inner, ..)) if !flags.contains(ASTFlags::BREAK) => {
+                    (&inner.lhs, Some(next))
+                }
                 last => (last, None),
             };
+            let is_index = matches!(link, Expr::Index(..));
             steps.push(self.one_step(item, is_index, flags.contains(ASTFlags::NEGATED), *position)?);
-            match next {
-                Some(next) => link = next,
-                None => break,
-            }
+            rest = next;
         }
         match root {
             Some(root) => Ok((root, steps)),

@@ -260,6 +260,22 @@ impl Abstract {
         }
     }
 
+    /// How many values it is made of, counted up to `limit`.
+    pub fn count_parts(&self, limit: usize) -> usize {
+        let count = |parts: &mut dyn Iterator<Item = &Self>| {
+            let mut total = 1;
+            while let Some(part) = parts.next().filter(|_| total < limit) {
+                total += part.count_parts(limit - total);
+            }
+            total
+        };
+        match &self.shape {
+            Shape::Record(record) => count(&mut record.fields.values().map(|field| &field.value)),
+            Shape::Array(items) => count(&mut items.iter()),
+            _ => 1,
+        }
+    }
+
     /// How deep records and arrays are nested in it.
     pub fn depth(&self) -> usize {
         match &self.shape {

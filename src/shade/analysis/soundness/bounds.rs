@@ -206,7 +206,7 @@ fn operations_stay_within_their_bounds() {
         let result = TestRunner::new(config)
             .run(&operands(count), |operands| check(&engine, name, &ast, &operands).map_err(TestCaseError::fail));
         if let Err(error) = result {
-            failures.push(format!("{}", error.to_string().lines().next().unwrap_or_default()));
+            failures.extend(error.to_string().lines().next().map(str::to_owned));
         }
     }
     assert!(failures.is_empty(), "{}", failures.join("\n"));
