@@ -202,7 +202,7 @@ fn operations_stay_within_their_bounds() {
         let mut compiler = Engine::new_raw();
         compiler.set_optimization_level(rhai::OptimizationLevel::None);
         let ast = compiler.compile_expression(expression(name, count)).expect("the expressions are well formed");
-        let config = ProptestConfig { cases: 2000, failure_persistence: None, ..ProptestConfig::default() };
+        let config = ProptestConfig { cases: 1000, failure_persistence: None, ..ProptestConfig::default() };
         let result = TestRunner::new(config)
             .run(&operands(count), |operands| check(&engine, name, &ast, &operands).map_err(TestCaseError::fail));
         if let Err(error) = result {

@@ -255,7 +255,7 @@ fn check(bench: &Bench, (program, found): &(Program, Analysis), hits: &[HitBatch
 #[test]
 fn facts_hold_on_generated_scripts() {
     let bench = Bench::new();
-    let config = ProptestConfig { cases: 1500, failure_persistence: None, ..ProptestConfig::default() };
+    let config = ProptestConfig { cases: 1200, failure_persistence: None, ..ProptestConfig::default() };
     let (followed, ran) = (Cell::new(0), Cell::new(0));
     let choices = prop::collection::vec(any::<u8>(), 100..900);
     let cases = (choices, prop::collection::vec(hit(), 4));
@@ -270,8 +270,8 @@ fn facts_hold_on_generated_scripts() {
         panic!("{error}");
     }
     // Scripts that fail, or that the analysis gives up on, test nothing.
-    assert!(followed.get() >= 1450, "{followed:?} scripts could be analysed");
-    assert!(ran.get() >= 4000, "scripts ran at {ran:?} hits");
+    assert!(followed.get() >= 1160, "{followed:?} scripts could be analysed");
+    assert!(ran.get() >= 3600, "scripts ran at {ran:?} hits");
 }
 
 /// Scripts in which a dependence is easily missed, each of which some simpler analysis gets wrong.
