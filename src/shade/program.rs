@@ -97,7 +97,8 @@ impl Shaders {
     /// Compiles and analyses all scripts of a scene. Warnings come beside the value.
     ///
     /// # Errors
-    /// Every syntax error, missing `surface`, fault in `params()`, and unknown or ill-typed parameter, at its place.
+    /// Every syntax error, missing `surface`, fault in `params()`, unknown or ill-typed parameter, and what the analysis
+    /// finds to be certainly wrong (unknown inputs, outputs and parameters in code that may run), at its place.
     pub fn compile(scene: &Scene, host: &Host) -> Result<(Self, Diagnostics), Diagnostics> {
         let engine = host.engine(&BTreeSet::new());
         let mut faults = Diagnostics::default();
@@ -118,13 +119,23 @@ impl Shaders {
         for material in scene.materials() {
             let Some((program, defaults)) = &scripts[material.script.index()] else { continue };
             match params::resolve(defaults.clone(), material, program) {
-                Ok(params) => shaders.push(Shader {
-                    name: material.name.clone(),
-                    analysis: analysis::analyse(&program.ast, &params, scene.textures()),
-                    record: ParameterRecord::new(&params, scene.textures()),
-                    params,
-                    program: Arc::clone(program),
-                }),
+                Ok(params) => {
+                    let analysis = analysis::analyse(&program.ast, &params, scene.textures());
+                    for finding in &analysis.findings {
+                        let fault = program.found(finding);
+                        // Materials that share a script share its faults.
+                        if !faults.0.contains(&fault) {
+                            faults.push(fault);
+                        }
+                    }
+                    shaders.push(Shader {
+                        name: material.name.clone(),
+                        analysis,
+                        record: ParameterRecord::new(&params, scene.textures()),
+                        params,
+                        program: Arc::clone(program),
+                    });
+                }
                 Err(found) => faults.extend(found),
             }
         }

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use rhai::{AST, ASTNode, Caches, Dynamic, Engine, EvalAltResult, Expr, ImmutableString, Position, Scope, Stmt};
 
+use super::analysis::Finding;
 use super::fault::{Fault, from_parse_error, from_run, span};
 use super::names::AOV_PREFIX;
 use crate::diag::{Diagnostic, Diagnostics, Source, Span};
@@ -130,6 +131,20 @@ impl Program {
     /// An error of a run, with its place.
     pub fn explain(&self, error: &EvalAltResult) -> Diagnostic {
         from_run(error, &self.source, &self.functions)
+    }
+
+    /// What the analysis found, at its place.
+    pub fn found(&self, finding: &Finding) -> Diagnostic {
+        let (line, column) = finding.place;
+        let span = match line {
+            0 => self.surface.span.clone(),
+            _ => Span::word_at(&self.source, line, column.max(1)),
+        };
+        let fault = Diagnostic::error(finding.message.clone()).at(span);
+        match &finding.hint {
+            Some(hint) => fault.hint(hint.clone()),
+            None => fault,
+        }
     }
 
     /// Where `params` stands.

@@ -25,6 +25,13 @@ fn assert_blamed(body: &str, place: &str, words: &[&str]) {
 
 #[test]
 fn a_run_time_error_counts_its_hits() {
+    let said = complaint("fn surface(hit, p) {\n    #{ feature: [1][hit.object_id] }\n}");
+    assert!(said.contains(" --> first.rhai:2:"), "{said}");
+    assert!(said.contains("  = help: this happened at 3 hits, which got the marker colour"), "{said}");
+}
+
+#[test]
+fn what_is_certainly_wrong_is_said_before_anything_is_shaded() {
     let said = complaint("fn surface(hit, p) {\n    #{ feature: hit.positon }\n}");
     let expected = "\
 error: there is no input `positon` on `hit`
@@ -33,8 +40,7 @@ error: there is no input `positon` on `hit`
 2 |     #{ feature: hit.positon }
   |                     ^^^^^^^
   |
-  = help: did you mean `position`?
-  = help: this happened at 3 hits, which got the marker colour";
+  = help: did you mean `position`?";
     assert_eq!(said, expected);
 }
 
@@ -130,8 +136,8 @@ fn a_parameter_of_another_script_is_unknown_too() {
         "fn surface(hit, p) { #{ line_width: p.thick } }",
         "fn params() { #{ thick: 1.0 } } fn surface(hit, p) { #{ line_width: p.thick } }",
     ]);
-    let (_, errors) = shade(&scene, &Host::new(), &batch(1));
-    assert!(rendered(&errors.into_diagnostics()).contains("there is no parameter `thick`"));
+    let faults = Shaders::compile(&scene, &Host::new()).expect_err("the first script has no such parameter");
+    assert!(rendered(&faults).contains("there is no parameter `thick`"));
 }
 
 #[test]
@@ -145,8 +151,7 @@ error: there is no output `bas_color`
 2 |     #{ bas_color: 1.0 }
   |        ^^^^^^^^^
   |
-  = help: did you mean `base_color`?
-  = help: a layer of your own is called `aov_` and a name",
+  = help: did you mean `base_color`?",
     );
 }
 

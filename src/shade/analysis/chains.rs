@@ -269,8 +269,14 @@ impl Walker<'_> {
             }
             None => {
                 if record.is_params {
-                    let names = record.fields.keys().map(|key| &**key);
-                    self.unknown_name(format!("there is no parameter `{name}`"), name, names, position);
+                    let message = format!("there is no parameter `{name}`");
+                    if record.fields.is_empty() {
+                        let place = place(position);
+                        let hint = Some(format!("declare it: fn params() {{ #{{ {name}: 1.0 }} }}"));
+                        self.findings.insert(Finding { place, message, hint });
+                    } else {
+                        self.unknown_name(message, name, record.fields.keys().map(|key| &**key), position);
+                    }
                 }
                 self.unit()
             }
