@@ -14,6 +14,7 @@
 //! [`render`] is the loop over all of it. Nothing but [`cli`] prints; problems are [`diag::Diagnostic`]s.
 
 pub mod cli;
+pub mod clock;
 pub mod diag;
 pub mod files;
 pub mod film;

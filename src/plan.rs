@@ -85,7 +85,7 @@ impl Plan {
     #[must_use]
     pub fn new(scene: &Scene, shaders: &Shaders, layers: &[Layer]) -> Self {
         let settings = scene.render();
-        let color = layers.iter().any(|layer| matches!(layer, Layer::Rgba | Layer::Color | Layer::Aov(..)));
+        let color = layers.iter().any(|layer| matches!(layer, Layer::Rgba | Layer::Color));
         let used = used_materials(scene);
         let tests = scene.lines();
         let wants_feature = tests.feature.is_some() || layers.contains(&Layer::Feature);
@@ -117,6 +117,7 @@ impl Plan {
             uv: (lines.is_some() && tests.uv.is_some()) || layers.contains(&Layer::Uv),
             normal: (lines.is_some() && tests.normal.is_some()) || layers.contains(&Layer::Normal),
             feature: (lines.is_some() && tests.feature.is_some()) || layers.contains(&Layer::Feature),
+            depth: lines.is_some() || layers.contains(&Layer::Depth),
             lines: lines.is_some(),
             throughput: line_paths && (tests.tint || throughput_composition),
             contribution: lines.is_some() && throughput_composition,
@@ -362,7 +363,6 @@ fn explain_lines(plan: &Plan, settings: &LineSettings) -> String {
 
 fn columns(plan: &Plan) -> Vec<&'static str> {
     let set = plan.layout.columns;
-    let keeps_depth = plan.lines.is_some() || plan.layers.contains(&Layer::Depth);
     [
         (true, "color"),
         (true, "object"),
@@ -370,7 +370,7 @@ fn columns(plan: &Plan) -> Vec<&'static str> {
         (set.uv, "uv"),
         (set.normal, "normal"),
         (set.feature, "feature"),
-        (keeps_depth, "depth"),
+        (set.depth, "depth"),
         (set.lines, "line_color line_width priority"),
         (set.throughput, "throughput"),
         (set.contribution, "contribution"),

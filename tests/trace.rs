@@ -192,6 +192,70 @@ fn of_surfaces_at_one_depth_the_lowest_object_and_triangle_counts() {
 }
 
 #[test]
+fn of_coplanar_triangles_all_over_a_mesh_the_lowest_counts() {
+    // A wavy net of squares, and the same once more.
+    let mut net = Mesh::default();
+    let side = 24_u32;
+    for index in 0..(side + 1) * (side + 1) {
+        let [x, y] = [index % (side + 1), index / (side + 1)].map(|i| i as f32 / side as f32 * 2.0 - 1.0);
+        net.positions.push(Vec3::new(x, y, 0.05 * (7.0 * x).sin()));
+    }
+    for square in 0..side * side {
+        let a = square / side * (side + 1) + square % side;
+        net.triangles.extend([[a, a + 1, a + side + 2], [a, a + side + 2, a + side + 1]]);
+    }
+    let once = net.triangles.len() as u32;
+    net.triangles.extend_from_within(..);
+    for turn in [0.0, 0.4, 1.2] {
+        let mut builder = builder();
+        place(&mut builder, net.clone(), DAffine3::from_rotation_y(turn) * DAffine3::from_rotation_x(0.7 * turn));
+        let (_, world) = world(builder);
+        let mut state = 11;
+        let mut hits = 0;
+        for _ in 0..20_000 {
+            let target = Vec3::new(random(&mut state), random(&mut state), 0.0);
+            let ray = Ray::new(Vec3::ZERO, (target - world.origin.as_vec3()).normalize());
+            let Some(hit) = world.closest(&ray, RayKinds::CAMERA, f32::INFINITY) else { continue };
+            hits += 1;
+            assert!(hit.triangle < once, "turned by {turn}: triangle {}", hit.triangle);
+        }
+        assert!(hits > 4_000, "turned by {turn}: {hits} hits");
+    }
+}
+
+#[test]
+fn rays_that_leave_far_turned_and_stretched_objects_do_not_meet_them_again() {
+    for (stretch, distance) in [(1.0, 1e4), (100.0, 1.0), (100.0, 1e3), (1e-3, 10.0)] {
+        let mut builder = builder();
+        let linear = DAffine3::from_rotation_z(0.7)
+            * DAffine3::from_scale(DVec3::new(1.0, stretch, 0.3))
+            * DAffine3::from_rotation_y(0.4);
+        let center = DVec3::new(0.3, -0.2, -1.0) * distance;
+        place(&mut builder, ball(32, 64, 1.0), DAffine3::from_translation(center) * linear);
+        builder.cameras[0].position = DVec3::Z * 3.0 * stretch.max(1.0);
+        let (_, world) = world(builder);
+        let mut state = 9;
+        let (mut hits, mut acne) = (0, 0);
+        for _ in 0..20_000 {
+            let inside = DVec3::new(random(&mut state).into(), random(&mut state).into(), random(&mut state).into());
+            let target = (center + linear.transform_point3(inside * 0.55) - world.origin).as_vec3();
+            let ray = Ray::new(Vec3::ZERO, target.normalize());
+            let Some(hit) = world.closest(&ray, RayKinds::CAMERA, f32::INFINITY) else { continue };
+            let surface = Surface::new(&world, &ray, &hit);
+            let any = Vec3::new(random(&mut state), random(&mut state), random(&mut state)).normalize();
+            let along = (any - surface.geometric_normal * any.dot(surface.geometric_normal)).normalize();
+            for direction in [surface.geometric_normal, along + surface.geometric_normal * 1e-3] {
+                hits += 1;
+                let again = Ray::new(surface.leave(direction), direction.normalize());
+                acne += usize::from(world.closest(&again, RayKinds::SHADOW, f32::INFINITY).is_some());
+            }
+        }
+        assert!(hits > 20_000, "{hits}");
+        assert_eq!(acne, 0, "stretched by {stretch}, {distance} away, of {hits}");
+    }
+}
+
+#[test]
 fn a_mesh_used_ten_thousand_times_is_stored_once() {
     let mut builder = builder();
     let mesh = Arc::new(ball(8, 16, 0.01));

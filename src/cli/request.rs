@@ -1,10 +1,10 @@
 //! Arguments as meant: the scene, its shaders and its plan.
 
 use std::path::{Path, PathBuf};
-use std::time::Instant;
 
 use super::args::{LineMode, SceneArguments, Size};
 use super::{Failure, terminal};
+use crate::clock::CpuClock;
 use crate::diag::{Diagnostic, Diagnostics};
 use crate::files::FileStore;
 use crate::film::Layer;
@@ -27,7 +27,7 @@ pub(super) struct Request {
 impl Request {
     /// Loads, resolves and compiles everything; warnings are printed unless `--quiet`.
     pub fn new(arguments: &SceneArguments, frame: Option<f64>, outputs: &[PathBuf]) -> Result<Self, Failure> {
-        let start = Instant::now();
+        let clock = CpuClock::process();
         let files = FileStore::new();
         let (builder, mut warnings) = load(arguments, frame, &files)?;
         let scene = builder.build()?;
@@ -41,7 +41,7 @@ impl Request {
             .map(|path| Ok(PictureFile { path: path.clone(), layers: layers_for(path, &arguments.layer, &shaders)? }))
             .collect::<Result<Vec<_>, Diagnostic>>()?;
         let plan = Plan::new(&scene, &shaders, &layers_of(&files));
-        Ok(Self { scene, shaders, plan, files, load_seconds: start.elapsed().as_secs_f64() })
+        Ok(Self { scene, shaders, plan, files, load_seconds: clock.seconds() })
     }
 }
 

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use super::{Control, RenderOptions, Report, render};
+use crate::clock::CpuClock;
 use crate::diag::Diagnostic;
 use crate::film::{FilmTile, Layer, Output, OutputSettings};
 use crate::plan::Plan;
@@ -48,9 +49,9 @@ pub fn render_files(
     let mut report = render(scene, shaders, plan, options, control, &|tile| {
         outputs.iter().try_for_each(|part| part.output.write(&part.of(tile)))
     })?;
-    let finish = Instant::now();
+    let finish = CpuClock::thread();
     outputs.into_iter().try_for_each(|part| part.output.finish())?;
-    report.stats.seconds.film += finish.elapsed().as_secs_f64();
+    report.stats.seconds.film += finish.seconds();
     report.stats.seconds.total = start.elapsed().as_secs_f64();
     Ok(report)
 }

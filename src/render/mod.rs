@@ -17,6 +17,7 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 
+use crate::clock::CpuClock;
 use crate::diag::{Diagnostic, Diagnostics};
 use crate::film::{FilmTile, FilmWindow, develop};
 use crate::line::{LineBuffer, LineCounts, LineTile, Method, TileBounds, Window, find_lines};
@@ -35,7 +36,7 @@ use stats::{Lines, Seconds, ShaderStats, Stats};
 pub struct RenderOptions {
     /// Threads; 0 for as many as the machine has.
     pub threads: usize,
-    /// Side of a tile in pixels, at least 1.
+    /// Side of a tile in pixels, at least 1; smaller ones are taken where there are very many samples.
     pub tile: u32,
     /// The pixels to render; `None` for all.
     pub crop: Option<PixelRect>,
@@ -92,10 +93,11 @@ pub fn render(
         .map_err(|error| Diagnostic::error(format!("cannot start rendering threads: {error}")))?;
     pool.install(|| {
         let start = Instant::now();
+        let building = CpuClock::process();
         let transmissive: Vec<bool> = plan.materials.iter().map(|material| material.refracts).collect();
         let world = World::new(scene, &transmissive);
         let lighting = Lighting::new(scene, world.origin);
-        let build = start.elapsed().as_secs_f64();
+        let build = building.seconds();
         let tracer = TileTracer::new(scene, plan, &world, &lighting);
         let mut render = Render::new(scene, shaders, plan, options, control, tracer);
         render.run(emit)?;
@@ -104,6 +106,12 @@ pub fn render(
         report.stats.seconds.total = start.elapsed().as_secs_f64();
         Ok(report)
     })
+}
+
+/// The largest side of a tile, for a number of samples per pixel: a tile holds at most 2²² samples, some hundred
+/// megabytes, if that leaves it a pixel.
+fn largest_tile(samples: u32) -> u32 {
+    ((1 << 22) / samples.max(1)).isqrt().max(1)
 }
 
 /// The state of a render.
@@ -177,7 +185,8 @@ impl<'a> Render<'a> {
         let picture = PixelRect::of_size(scene.render().size);
         let crop = options.crop.map_or(picture, |crop| crop.intersection(&picture));
         let border = plan.lines.as_ref().map_or(0, |lines| lines.reach) + plan.filter.reach();
-        let grid = Grid::new(crop.grown(border).intersection(&picture), options.tile.max(1));
+        let tile = options.tile.clamp(1, largest_tile(scene.render().samples));
+        let grid = Grid::new(crop.grown(border).intersection(&picture), tile);
         let materials = scene.materials().len();
         Self {
             scene,
@@ -247,11 +256,11 @@ impl<'a> Render<'a> {
         if self.cancelled() {
             return Ok(None);
         }
-        let start = Instant::now();
+        let clock = CpuClock::thread();
         let product = match job {
             Job::Sample(tile) => Some(self.sample(tile)),
             Job::Line(tile) => self.line(tile).map(|lines| {
-                let seconds = start.elapsed().as_secs_f64();
+                let seconds = clock.seconds();
                 Product::Lined { tile, lines: Box::new(lines), seconds }
             }),
             Job::Develop(tile) => {
@@ -259,7 +268,7 @@ impl<'a> Render<'a> {
                 if film.rect.pixels() > 0 {
                     emit(&film)?;
                 }
-                Some(Product::Developed { seconds: start.elapsed().as_secs_f64() })
+                Some(Product::Developed { seconds: clock.seconds() })
             }
         };
         let done = self.jobs_done.fetch_add(1, Ordering::Relaxed) + 1;
@@ -275,9 +284,9 @@ impl<'a> Render<'a> {
         let mut context = free.unwrap_or_else(|| TraceContext::new(self.scene, self.shaders));
         let traced = Box::new(self.tracer.trace(self.grid.rect(tile), &mut context));
         self.contexts.lock().unwrap_or_else(PoisonError::into_inner).push(context);
-        let start = Instant::now();
+        let clock = CpuClock::thread();
         let bounds = self.plan.lines.as_ref().map(|lines| TileBounds::new(&traced.samples, &lines.rules));
-        Product::Sampled { tile, traced, bounds, line_seconds: start.elapsed().as_secs_f64() }
+        Product::Sampled { tile, traced, bounds, line_seconds: clock.seconds() }
     }
 
     fn line(&self, tile: usize) -> Option<LineBuffer> {
@@ -313,7 +322,7 @@ impl<'a> Render<'a> {
                 totals.seconds.shade += shading;
                 totals.rays += rays;
                 totals.samples += samples.color.len() as u64;
-                totals.bytes += samples.bytes() as u64;
+                totals.bytes += (samples.bytes() + bounds.as_ref().map_or(0, TileBounds::bytes)) as u64;
                 totals.hits.iter_mut().zip(&hits).for_each(|(total, hits)| *total += hits);
                 totals.shade_seconds.iter_mut().zip(&shade_seconds).for_each(|(total, seconds)| *total += seconds);
                 totals.gate.iter_mut().zip(&samples.gate).for_each(|(total, gate)| *total += *gate);

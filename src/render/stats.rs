@@ -17,7 +17,7 @@ pub struct Stats {
     pub rays: Rays,
     /// Camera samples.
     pub samples: u64,
-    /// Mean size of a sample in memory.
+    /// Mean size of a sample in memory, with what the line pass prepares for its search.
     pub bytes_per_sample: f64,
     /// The line pass.
     pub lines: Lines,
@@ -33,7 +33,8 @@ pub struct Stats {
     pub plan: String,
 }
 
-/// `total` is wall time; the others are CPU seconds summed over threads.
+/// `total` is wall time; the others are CPU seconds summed over threads. Those of `load` and `build` count all that the
+/// process does meanwhile.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
 pub struct Seconds {
     /// From start to finished files.

@@ -164,6 +164,8 @@ pub struct NodeColumnSet {
     pub normal: bool,
     /// The feature test or layer is on.
     pub feature: bool,
+    /// Lines or the depth layer are on.
+    pub depth: bool,
     /// Lines are on: line colour, line width, priority.
     pub lines: bool,
     /// Tint or throughput composition is on and there are secondary paths.
@@ -175,7 +177,7 @@ pub struct NodeColumnSet {
 impl NodeColumnSet {
     /// Every column.
     pub const ALL: Self =
-        Self { uv: true, normal: true, feature: true, lines: true, throughput: true, contribution: true };
+        Self { uv: true, normal: true, feature: true, depth: true, lines: true, throughput: true, contribution: true };
 }
 
 /// All nodes at one path, in the order of their samples.

@@ -196,7 +196,9 @@ impl PathRows {
         self.sample.push(sample);
         self.object.push(row, node.object, expected);
         self.shader.push(row, node.shader, expected);
-        self.depth.push(row, node.depth, expected);
+        if kept.depth {
+            self.depth.push(row, node.depth, expected);
+        }
         if kept.uv {
             self.uv.push(row, node.uv, expected);
         }

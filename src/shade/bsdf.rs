@@ -40,11 +40,17 @@ pub struct Bounces {
     pub refracted: Vec3,
 }
 
+/// A share from a script, brought into 0 … 1; NaN becomes the default.
+#[inline]
+#[must_use]
+pub fn unit(share: f32, default: f32) -> f32 {
+    if share.is_nan() { default } else { share.clamp(0.0, 1.0) }
+}
+
 impl Bsdf {
     /// The same with every parameter in its range; NaN becomes the default.
     #[must_use]
     pub fn checked(mut self) -> Self {
-        let unit = |x: f32, default: f32| if x.is_nan() { default } else { x.clamp(0.0, 1.0) };
         self.metallic = unit(self.metallic, 0.0);
         self.roughness = unit(self.roughness, 1.0);
         self.specular = unit(self.specular, 1.0);
@@ -62,6 +68,11 @@ impl Bsdf {
     fn dielectric_f0(&self) -> f32 {
         let r = (self.ior - 1.0) / (self.ior + 1.0);
         r * r * self.specular
+    }
+
+    /// The index of refraction on the viewer's side over the one behind.
+    fn eta(&self) -> f32 {
+        if self.outside { 1.0 / self.ior } else { self.ior }
     }
 
     fn diffuse_color(&self) -> Vec3 {
@@ -105,25 +116,30 @@ impl Bsdf {
     }
 
     /// Radiance towards `view` from light all around: `ambient` for what is scattered, `mirrored` (the background seen
-    /// in the mirror direction) for what is reflected.
+    /// in the mirror direction) for what is reflected; it is asked for only if it matters.
     ///
-    /// The reflected part is Karis' fit of the split sum ("Physically Based Shading on Mobile", 2014).
+    /// The reflected part is Karis' fit of the split sum ("Physically Based Shading on Mobile", 2014). Only what is not
+    /// reflected is scattered, so that nothing outshines surroundings of one colour.
     #[must_use]
-    pub fn surroundings(&self, view: Vec3, ambient: Vec3, mirrored: Vec3) -> Vec3 {
-        let diffuse = self.diffuse_color() * ambient;
-        let specular = if self.is_mirror() {
-            Vec3::ZERO
+    pub fn surroundings(&self, view: Vec3, ambient: Vec3, mirrored: impl FnOnce() -> Vec3) -> Vec3 {
+        let cos_view = self.normal.dot(view).clamp(0.0, 1.0);
+        let (reflected, specular) = if self.is_mirror() {
+            let (fresnel, _) = fresnel_dielectric(cos_view, self.eta());
+            (fresnel * self.specular, Vec3::ZERO)
         } else {
-            let cos_view = self.normal.dot(view).clamp(0.0, 1.0);
             let r = self.roughness;
             let (x, y) = (1.0 - r, 0.0425 - 0.0275 * r);
             let a = (x * x).min(portable::exp2(-9.28 * cos_view)) * x + y;
             let scale = -1.04 * a + 1.04 - 0.572 * r;
             let bias = 1.04 * a - 0.04 + 0.022 * r;
-            let f0 = Vec3::splat(self.dielectric_f0()).lerp(self.base_color, self.metallic);
-            let reflectance = f0 * scale + Vec3::splat(bias.max(0.0) * self.specular.max(self.metallic));
-            reflectance * mirrored.lerp(ambient, r)
+            let bias = bias.max(0.0);
+            let dielectric = self.dielectric_f0() * scale + bias * self.specular;
+            let metal = self.base_color * scale + Vec3::splat(bias);
+            let reflectance = Vec3::splat(dielectric).lerp(metal, self.metallic);
+            let around = if r < 1.0 { mirrored().lerp(ambient, r) } else { ambient };
+            (dielectric, reflectance * around)
         };
+        let diffuse = self.diffuse_color() * ambient * (1.0 - reflected.clamp(0.0, 1.0));
         (diffuse + specular) * self.occlusion
     }
 
@@ -136,39 +152,37 @@ impl Bsdf {
         if direction.dot(geometric_normal) > 0.0 { direction } else { about(geometric_normal) }
     }
 
-    /// Ideal reflection and refraction of `incoming` (unit, towards the surface).
+    /// Ideal reflection and refraction of `incoming` (unit, towards the surface). The weights never add up to more than
+    /// 1, whatever colours a script gives: a tree of rays that gained light on its way might have no end.
     #[must_use]
     pub fn bounces(&self, incoming: Vec3, geometric_normal: Vec3) -> Bounces {
         let cos_view = (-self.normal.dot(incoming)).clamp(0.0, 1.0);
-        // Ratio of the indices on the viewer's side and behind.
-        let eta = if self.outside { 1.0 / self.ior } else { self.ior };
+        let eta = self.eta();
+        let base_color = self.base_color.clamp(Vec3::ZERO, Vec3::ONE);
         let (fresnel, cos_inside) = fresnel_dielectric(cos_view, eta);
         let mut bounces = Bounces::default();
 
         let dielectric = 1.0 - self.metallic;
         let total_reflection = cos_inside.is_none();
         if self.is_mirror() || (total_reflection && self.transmission > 0.0) {
-            let metal = self.base_color + (Vec3::ONE - self.base_color) * schlick(cos_view);
+            let mirrored = if self.is_mirror() { self.specular } else { 0.0 };
             // `specular` weakens the reflection of a surface, but light that cannot leave a body stays in it.
-            let strength = if total_reflection { self.transmission.max(self.specular) } else { self.specular };
-            bounces.reflection = Vec3::splat(dielectric * fresnel * strength);
+            let kept = if total_reflection { (1.0 - self.specular) * self.transmission } else { 0.0 };
+            bounces.reflection = Vec3::splat(dielectric * (fresnel * mirrored + kept));
             if self.is_mirror() {
+                let metal = base_color + (Vec3::ONE - base_color) * schlick(cos_view);
                 bounces.reflection += metal * self.metallic;
             }
         }
         if let Some(cos_inside) = cos_inside
             && self.transmission > 0.0
         {
-            let bend = |normal: Vec3| {
-                let cos = -normal.dot(incoming);
-                let sin2 = eta * eta * (1.0 - cos * cos).max(0.0);
-                (incoming * eta + normal * (eta * cos - (1.0 - sin2).max(0.0).sqrt())).normalize_or(incoming)
-            };
             let direction = (incoming * eta + self.normal * (eta * cos_view - cos_inside)).normalize_or(incoming);
+            // A shading normal can bend a ray so far that it would stay on its side; then it goes straight on.
             let through = direction.dot(geometric_normal) < 0.0;
-            bounces.refracted = if through { direction } else { bend(geometric_normal) };
+            bounces.refracted = if through { direction } else { incoming };
             let passed = 1.0 - fresnel * self.specular;
-            bounces.refraction = self.base_color * (dielectric * self.transmission * passed);
+            bounces.refraction = base_color * (dielectric * self.transmission * passed);
         }
         bounces
     }
@@ -184,14 +198,14 @@ fn schlick(cos: f32) -> f32 {
 /// Fresnel reflectance of a smooth dielectric for unpolarised light, and the cosine behind the surface (`None`: total
 /// internal reflection). `eta` is the index on the viewer's side over the index behind.
 fn fresnel_dielectric(cos: f32, eta: f32) -> (f32, Option<f32>) {
+    if eta == 1.0 {
+        return (0.0, Some(cos));
+    }
     let sin2 = eta * eta * (1.0 - cos * cos);
     if sin2 >= 1.0 {
         return (1.0, None);
     }
     let cos_behind = (1.0 - sin2).sqrt();
-    if eta == 1.0 {
-        return (0.0, Some(cos_behind));
-    }
     let parallel = (cos - eta * cos_behind) / (cos + eta * cos_behind);
     let perpendicular = (eta * cos - cos_behind) / (eta * cos + cos_behind);
     (((parallel * parallel + perpendicular * perpendicular) * 0.5).clamp(0.0, 1.0), Some(cos_behind))

@@ -92,14 +92,16 @@ impl Lighting {
     }
 
     /// What a light gives a point (relative to the camera) if nothing is in between, and how far away it is (∞ for a
-    /// sun). A point that lies in the light itself gets nothing.
+    /// sun). A point that lies in the light itself, or farther from it than can be counted, gets nothing.
     #[must_use]
     pub fn sample(&self, light: usize, position: Vec3) -> (LightSample, f32) {
         let PlacedLight { form, strength, .. } = &self.lights[light];
         let from_point = |from: Vec3| {
-            let distance = (from - position).length();
+            let distance_squared = (from - position).length_squared();
+            let distance = distance_squared.sqrt();
             let direction = (from - position) / distance;
-            (distance > 0.0).then_some((direction, distance, *strength / (distance * distance)))
+            // Nearer than this the square of the distance has no single-precision value.
+            distance_squared.is_normal().then_some((direction, distance, *strength / distance_squared))
         };
         let found = match form {
             Form::Sun { direction } => Some((*direction, f32::INFINITY, *strength)),

@@ -1,7 +1,7 @@
 //! The ray trees of a run of samples while they are traced.
 
 use super::surface::Surface;
-use super::world::Hit;
+use super::world::{Hit, HitRank};
 use crate::math::Vec3;
 use crate::sample::{Node, NodePath};
 use crate::scene::ids::MaterialId;
@@ -17,8 +17,8 @@ pub(super) struct TreeNode {
     pub kind: PathKind,
     /// What of this node its parent sees.
     pub weight: Vec3,
-    /// Whether the ray went straight on through its parent, which then lets alpha through.
-    pub straight: bool,
+    /// How much of this node's coverage its parent takes over: what shows through a see-through surface, else 0.
+    pub alpha_weight: f32,
     /// Letters of the path that are reflections.
     pub reflections: u32,
     /// Letters of the path that are refractions.
@@ -33,7 +33,8 @@ pub(super) struct TreeNode {
     pub radiance: Vec3,
     /// Coverage along the ray.
     pub alpha: f32,
-    pub opacity: f32,
+    /// The shader, as in `attributes`, that is to blame if the radiance is not finite.
+    pub culprit: u32,
 }
 
 impl TreeNode {
@@ -45,7 +46,7 @@ impl TreeNode {
             path: NodePath::CAMERA,
             kind: PathKind::Camera,
             weight: Vec3::ONE,
-            straight: false,
+            alpha_weight: 0.0,
             reflections: 0,
             refractions: 0,
             cone_width,
@@ -53,7 +54,7 @@ impl TreeNode {
             attributes: Node::default(),
             radiance: Vec3::ZERO,
             alpha: 1.0,
-            opacity: 1.0,
+            culprit: 0,
         }
     }
 }
@@ -64,8 +65,9 @@ pub(super) struct WaveRay {
     pub origin: Vec3,
     pub direction: Vec3,
     pub node: u32,
-    /// Distance already covered through invisible surfaces, and their number.
-    pub covered: f32,
+    /// The last of the invisible surfaces that the ray has passed, and their number. It goes on from where it started,
+    /// so that what it meets next is what it would have met without them.
+    pub after: Option<HitRank>,
     pub passed: u32,
 }
 
@@ -76,8 +78,6 @@ pub(super) struct WaveHit {
     pub hit: Hit,
     pub surface: Surface,
     pub material: MaterialId,
-    /// Length of the ray.
-    pub distance: f32,
     /// Path length from the camera.
     pub depth: f32,
 }
@@ -112,11 +112,14 @@ impl Run {
     /// additions is always the same.
     pub fn gather_radiance(&mut self) {
         for index in (0..self.nodes.len()).rev() {
-            let TreeNode { weight, radiance, alpha, straight, parent, .. } = self.nodes[index];
+            let TreeNode { weight, radiance, alpha, alpha_weight, culprit, parent, .. } = self.nodes[index];
             if let Some(parent) = parent {
                 let parent = &mut self.nodes[parent as usize];
+                if !radiance.is_finite() && parent.radiance.is_finite() {
+                    parent.culprit = culprit;
+                }
                 parent.radiance += weight * radiance;
-                parent.alpha = if straight { parent.opacity + (1.0 - parent.opacity) * alpha } else { 1.0 };
+                parent.alpha += alpha_weight * alpha;
             }
         }
     }

@@ -1,19 +1,18 @@
 //! Shading: groups of hits of one material become node attributes, radiance and further rays.
 
-use std::time::Instant;
-
 use super::ray_tree::{Run, TreeNode, WaveHit, WaveRay};
 use super::wave::{TileTracer, TraceContext, Work, value};
+use crate::clock::CpuClock;
 use crate::math::{Vec2, Vec3, luminance};
 use crate::plan::MaterialPlan;
 use crate::sample::{Node, NodePath};
 use crate::scene::ids::MaterialId;
 use crate::shade::batch::{HitBatch, LightSample, OutputBatch};
-use crate::shade::bsdf::Bounces;
+use crate::shade::bsdf::{Bounces, unit};
 use crate::shade::{Bsdf, InputSet, Mode, PathKind};
 
-/// A branch of the ray tree that weighs less than this in every channel is not traced: it could not change an 8-bit
-/// picture.
+/// A branch of the ray tree that weighs less than this in every channel is not traced: what it shows would have to be
+/// brighter than white to change an 8-bit picture by one step. Like a branch beyond the depth limits, it counts as black.
 const LEAST_THROUGHPUT: f32 = 1.0 / 512.0;
 
 /// The outputs of a material's shader at one hit: a batch and a row in it.
@@ -37,7 +36,7 @@ impl TileTracer<'_> {
         let lights = if plan.lights { self.light_samples(group, context, work) } else { Vec::new() };
         let lights_per_hit = if plan.lights { self.lighting.len() } else { 0 };
 
-        let start = Instant::now();
+        let clock = CpuClock::thread();
         let constant = plan.mode == Mode::Constant;
         if constant {
             self.evaluate_once(material, context);
@@ -45,7 +44,7 @@ impl TileTracer<'_> {
             self.evaluate(material, group, run, &lights, context);
         }
         work.hits[material.index()] += group.len() as u64;
-        work.shade_seconds[material.index()] += start.elapsed().as_secs_f64();
+        work.shade_seconds[material.index()] += clock.seconds();
 
         let batch = match &context.constants[material.index()] {
             Some(outputs) if constant => outputs,
@@ -67,7 +66,8 @@ impl TileTracer<'_> {
             hits.len = 1;
             hits.material_id = material.0 + 1;
             let outputs = constant.insert(OutputBatch::default());
-            shading.shade(material, hits, self.plan.materials[material.index()].wanted, outputs, errors);
+            let wanted = self.plan.materials[material.index()].wanted | self.marker;
+            shading.shade(material, hits, wanted, outputs, errors);
         }
     }
 
@@ -86,12 +86,14 @@ impl TileTracer<'_> {
         hits.material_id = material.0 + 1;
         hits.time = self.scene.time();
         hits.light_count = self.lighting.len();
-        hits.lights.extend_from_slice(lights);
+        if plan.inputs.intersects(InputSet::LIGHTS) {
+            hits.lights.extend_from_slice(lights);
+        }
         for hit in group {
             let node = &run.nodes[hit.ray.node as usize];
             self.gather(hits, plan.inputs, hit, node.kind, node.cone_width);
         }
-        shading.shade(material, hits, plan.wanted, outputs, errors);
+        shading.shade(material, hits, plan.wanted | self.marker, outputs, errors);
     }
 
     /// Adds one hit to a batch: only the columns that are read.
@@ -146,7 +148,7 @@ impl TileTracer<'_> {
             batch.barycentric.push(surface.barycentric);
         }
         if inputs.contains(InputSet::DISTANCE) {
-            batch.distance.push(hit.distance);
+            batch.distance.push(hit.hit.t);
         }
         if inputs.contains(InputSet::DEPTH) {
             batch.depth.push(hit.depth);
@@ -158,7 +160,7 @@ impl TileTracer<'_> {
             batch.front_facing.push(surface.front);
         }
         if inputs.contains(InputSet::PIXELS_PER_UNIT) {
-            let width = cone_width + self.cone.1 * hit.distance;
+            let width = cone_width + self.cone.1 * hit.hit.t;
             batch.pixels_per_unit.push(1.0 / width.max(f32::MIN_POSITIVE));
         }
         if inputs.contains(InputSet::CURVATURE) {
@@ -170,17 +172,10 @@ impl TileTracer<'_> {
     fn finish(&self, hit: &WaveHit, plan: &MaterialPlan, outputs: Outputs<'_>, lights: &[LightSample], run: &mut Run) {
         let direction = hit.ray.direction;
         let Outputs { batch, row } = outputs;
-        let opacity = value(&batch.opacity, row, 1.0);
-        let opacity = if opacity.is_nan() { 1.0 } else { opacity.clamp(0.0, 1.0) };
+        let opacity = unit(value(&batch.opacity, row, 1.0), 1.0);
         if opacity == 0.0 {
             // Not there: the ray goes on for the same node.
-            run.again.push(WaveRay {
-                origin: hit.surface.leave(direction),
-                direction,
-                node: hit.ray.node,
-                covered: hit.distance,
-                passed: hit.ray.passed + 1,
-            });
+            run.again.push(WaveRay { after: Some(hit.hit.rank()), passed: hit.ray.passed + 1, ..hit.ray });
             return;
         }
 
@@ -188,8 +183,8 @@ impl TileTracer<'_> {
         let index = hit.ray.node as usize;
         let node = &mut run.nodes[index];
         node.attributes = Node { throughput: node.attributes.throughput, ..self.attributes(hit, outputs) };
-        node.opacity = opacity;
-        node.alpha = opacity;
+        node.culprit = node.attributes.shader;
+        node.alpha = if self.transparent { opacity } else { 1.0 };
         if node.path == NodePath::CAMERA {
             if let Some(position) = run.positions.get_mut(index) {
                 *position = self.in_world(hit.surface.position);
@@ -214,8 +209,7 @@ impl TileTracer<'_> {
                 for light in arriving {
                     radiance += bsdf.scatter(-direction, light.direction, light.radiance * light.visibility);
                 }
-                let background = self.lighting.background(mirrored);
-                radiance += bsdf.surroundings(-direction, self.lighting.ambient, background);
+                radiance += bsdf.surroundings(-direction, self.lighting.ambient, || self.lighting.background(mirrored));
                 node.radiance = radiance * opacity;
             }
             if plan.reflects || plan.refracts {
@@ -223,24 +217,25 @@ impl TileTracer<'_> {
             }
         }
 
+        let refraction = bounces.refraction * opacity;
+        let through = Vec3::splat(1.0 - opacity);
+        // One ray stands for both ways through a surface that is see-through and refracts.
+        let straight = luminance(through) >= luminance(refraction);
+        if !straight {
+            // What glass shows is bent: on another page it would not be what lies behind.
+            node.alpha = 1.0;
+        }
         let node = *node;
         if node.reflections < self.plan.reflection_depth {
             let weight = bounces.reflection * opacity;
-            self.send(
-                hit,
-                &node,
-                Departure { kind: PathKind::Reflection, direction: mirrored, weight, straight: false },
-                run,
-            );
+            let kind = PathKind::Reflection;
+            self.send(hit, &node, Departure { kind, direction: mirrored, weight, alpha_weight: 0.0 }, run);
         }
         if node.refractions < self.plan.refraction_depth {
-            let refraction = bounces.refraction * opacity;
-            let through = Vec3::splat(1.0 - opacity);
-            // One ray stands for both ways through a surface that is see-through and refracts.
-            let straight = luminance(through) >= luminance(refraction);
             let direction = if straight { direction } else { bounces.refracted };
+            let alpha_weight = 1.0 - node.alpha;
             let weight = refraction + through;
-            self.send(hit, &node, Departure { kind: PathKind::Refraction, direction, weight, straight }, run);
+            self.send(hit, &node, Departure { kind: PathKind::Refraction, direction, weight, alpha_weight }, run);
         }
     }
 
@@ -291,25 +286,25 @@ impl TileTracer<'_> {
 
     /// Sends a ray on from a hit, unless it could not be seen.
     fn send(&self, hit: &WaveHit, parent: &TreeNode, departure: Departure, run: &mut Run) {
-        let Departure { kind, direction, weight, straight } = departure;
+        let Departure { kind, direction, weight, alpha_weight } = departure;
         let throughput = Vec3::from(parent.attributes.throughput) * weight;
         if !throughput.is_finite() || throughput.max_element() < LEAST_THROUGHPUT {
             return;
         }
         let reflected = kind == PathKind::Reflection;
         let origin = hit.surface.leave(direction);
-        run.next.push(WaveRay { origin, direction, node: run.nodes.len() as u32, covered: 0.0, passed: 0 });
+        run.next.push(WaveRay { origin, direction, node: run.nodes.len() as u32, after: None, passed: 0 });
         run.nodes.push(TreeNode {
             parent: Some(hit.ray.node),
             path: if reflected { parent.path.reflected() } else { parent.path.refracted() },
             kind,
             weight,
-            straight,
+            alpha_weight,
             reflections: parent.reflections + u32::from(reflected),
             refractions: parent.refractions + u32::from(!reflected),
             length_before: hit.depth,
             attributes: Node { throughput: throughput.to_array(), ..Node::default() },
-            ..TreeNode::root(parent.sample, parent.cone_width + self.cone.1 * hit.distance)
+            ..TreeNode::root(parent.sample, parent.cone_width + self.cone.1 * hit.hit.t)
         });
     }
 
@@ -325,6 +320,6 @@ struct Departure {
     direction: Vec3,
     /// What the hit's node sees of it.
     weight: Vec3,
-    /// Whether it goes straight on through a see-through surface.
-    straight: bool,
+    /// What of its coverage the hit's node takes over.
+    alpha_weight: f32,
 }

@@ -1,15 +1,18 @@
 //! Light samples: what every light gives a hit, past what stands in the way.
-
-use std::time::Instant;
+//!
+//! Shadow rays go straight on through see-through and transmissive surfaces and lose what those do not let pass; they
+//! are neither bent nor tinted, and reflection at glass takes nothing from them.
 
 use super::ray_tree::{WaveHit, WaveRay};
 use super::surface::Surface;
 use super::triangle::Ray;
 use super::wave::{TileTracer, TraceContext, Work, value};
 use super::world::Hit;
+use crate::clock::CpuClock;
 use crate::math::Vec3;
 use crate::scene::ids::MaterialId;
 use crate::shade::batch::{HitBatch, LightSample, OutputBatch};
+use crate::shade::bsdf::unit;
 use crate::shade::{InputSet, OutputSet, PathKind};
 
 impl TileTracer<'_> {
@@ -66,10 +69,10 @@ impl TileTracer<'_> {
             .iter()
             .map(|(sample, ray, hit)| {
                 let wave_ray =
-                    WaveRay { origin: ray.origin, direction: ray.direction, node: 0, covered: 0.0, passed: 0 };
+                    WaveRay { origin: ray.origin, direction: ray.direction, node: 0, after: None, passed: 0 };
                 let surface = Surface::new(self.world, ray, hit);
                 let material = self.world.material(hit);
-                (*sample, WaveHit { ray: wave_ray, hit: *hit, surface, material, distance: hit.t, depth: hit.t })
+                (*sample, WaveHit { ray: wave_ray, hit: *hit, surface, material, depth: hit.t })
             })
             .collect();
         hits.sort_by_key(|(_, hit)| hit.material);
@@ -79,7 +82,7 @@ impl TileTracer<'_> {
             let material = hits[first].1.material;
             let end = first + hits[first..].partition_point(|(_, hit)| hit.material == material);
             let plan = &self.plan.materials[material.index()];
-            let start = Instant::now();
+            let clock = CpuClock::thread();
             let mut batch = HitBatch { material_id: material.0 + 1, time: self.scene.time(), ..HitBatch::default() };
             batch.light_count = self.lighting.len();
             for (_, hit) in &hits[first..end] {
@@ -90,22 +93,27 @@ impl TileTracer<'_> {
                 }
             }
             let mut outputs = OutputBatch::default();
-            let wanted = plan.wanted & (OutputSet::OPACITY | OutputSet::TRANSMISSION | OutputSet::METALLIC);
+            let wanted = OutputSet::OPACITY | OutputSet::TRANSMISSION | OutputSet::METALLIC | OutputSet::COLOR;
+            let wanted = wanted & (plan.wanted | self.marker);
             context.shading.shade(material, &batch, wanted, &mut outputs, &mut context.errors);
             work.hits[material.index()] += batch.len as u64;
-            work.shade_seconds[material.index()] += start.elapsed().as_secs_f64();
+            work.shade_seconds[material.index()] += clock.seconds();
             for (row, pass) in passes[first..end].iter_mut().enumerate() {
-                let opacity = value(&outputs.opacity, row, 1.0).clamp(0.0, 1.0);
-                let through = value(&outputs.transmission, row, 0.0).clamp(0.0, 1.0)
-                    * (1.0 - value(&outputs.metallic, row, 0.0).clamp(0.0, 1.0));
-                *pass = 1.0 - opacity * (1.0 - through);
+                // A hit whose colour is final lets no more light pass than it shows.
+                let through = if value(&outputs.color, row, None).is_some() {
+                    0.0
+                } else {
+                    unit(value(&outputs.transmission, row, 0.0), 0.0)
+                        * (1.0 - unit(value(&outputs.metallic, row, 0.0), 0.0))
+                };
+                *pass = 1.0 - unit(value(&outputs.opacity, row, 1.0), 1.0) * (1.0 - through);
             }
             first = end;
         }
         // In the order along each ray again: products round differently in other orders.
         let mut order: Vec<usize> = (0..hits.len()).collect();
         order.sort_by(|&a, &b| {
-            let key = |i: usize| (hits[i].0, hits[i].1.distance, hits[i].1.hit.object, hits[i].1.hit.triangle);
+            let key = |i: usize| (hits[i].0, hits[i].1.hit.rank());
             key(a).partial_cmp(&key(b)).unwrap_or(std::cmp::Ordering::Equal)
         });
         for index in order {

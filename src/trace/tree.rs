@@ -2,8 +2,8 @@
 //!
 //! obvhs' own ray loop clamps directions at 1e-7 and does not round its box test outwards, so a ray may miss a box
 //! whose triangle it meets. Here the far distance is widened as Ize shows ("Robust BVH Ray Traversal", JCGT 2013), and
-//! boxes at exactly the best distance are still visited, so that ties are settled by the lower triangle id and not by
-//! the order of the tree.
+//! boxes at the best distance, give or take roundings, are still visited, so that ties are settled by the lower triangle
+//! id and not by the order of the tree.
 
 use std::time::Duration;
 
@@ -19,6 +19,8 @@ use crate::scene::mesh::Mesh;
 
 /// 1 + 2 γ(3) in single precision, rounded up (Ize 2013, section 3).
 const BOX_FAR_SCALE: f32 = 1.000_000_4;
+/// The distance to a box and the one to a triangle on its face are rounded differently; this covers both.
+const BOX_NEAR_SCALE: f32 = 0.999_998;
 
 /// A hierarchy over any boxes. Its leaves are runs of [`BoxTree::order`].
 #[derive(Clone, Default)]
@@ -68,7 +70,7 @@ impl BoxTree {
             let bounds = node.aabb();
             let t1 = (bounds.min - origin) * inverse;
             let t2 = (bounds.max - origin) * inverse;
-            let near = t1.min(t2).max_element().max(0.0);
+            let near = t1.min(t2).max_element().max(0.0) * BOX_NEAR_SCALE;
             let far = t1.max(t2).min_element() * BOX_FAR_SCALE;
             if near <= far { near } else { f32::INFINITY }
         };

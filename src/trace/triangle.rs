@@ -35,10 +35,10 @@ pub struct TriangleHit {
 }
 
 impl Ray {
-    /// A ray; `origin` and `direction` must be finite and `direction` not zero.
+    /// A ray. One whose `origin` or `direction` is not finite, or whose `direction` is zero, meets nothing: an absurd
+    /// transform can make such rays in an object's own space.
     #[must_use]
     pub fn new(origin: Vec3, direction: Vec3) -> Self {
-        debug_assert!(origin.is_finite() && direction.is_finite() && direction != Vec3::ZERO);
         let magnitude = direction.abs();
         let z = if magnitude.x > magnitude.y && magnitude.x > magnitude.z {
             0
@@ -149,6 +149,20 @@ mod tests {
         assert!(ray.triangle(&TRIANGLE, 1.0).is_some());
         assert!(Ray::new(Vec3::new(0.25, 0.25, -1.0), Vec3::NEG_Z).triangle(&TRIANGLE, 9.0).is_none());
         assert!(Ray::new(Vec3::new(0.25, 0.25, 0.0), Vec3::NEG_Z).triangle(&TRIANGLE, 9.0).is_none());
+    }
+
+    #[test]
+    fn rays_that_are_not_finite_or_go_nowhere_meet_nothing() {
+        let [start, down] = [Vec3::new(0.25, 0.25, 1.0), Vec3::NEG_Z];
+        for (origin, direction) in [
+            (start, Vec3::ZERO),
+            (start, Vec3::new(0.0, 0.0, f32::NEG_INFINITY)),
+            (start, Vec3::NAN),
+            (Vec3::new(0.25, 0.25, f32::INFINITY), down),
+            (Vec3::new(f32::NAN, 0.25, 1.0), down),
+        ] {
+            assert_eq!(Ray::new(origin, direction).triangle(&TRIANGLE, f32::INFINITY), None, "{origin} {direction}");
+        }
     }
 
     #[test]

@@ -7,12 +7,12 @@
 //! thread count or order can change a bit.
 
 use std::ops::Range;
-use std::time::Instant;
 
 use super::ray_tree::{Run, TreeNode, WaveHit, WaveRay};
 use super::surface::Surface;
 use super::triangle::Ray;
 use super::world::World;
+use crate::clock::CpuClock;
 use crate::math::Vec3;
 use crate::plan::Plan;
 use crate::sample::position::SamplePositions;
@@ -20,10 +20,12 @@ use crate::sample::{PixelRect, SampleBuffer, SampleBufferBuilder, SampleColor};
 use crate::scene::Scene;
 use crate::scene::settings::{Background, RayKinds};
 use crate::shade::batch::{HitBatch, OutputBatch};
-use crate::shade::{Lighting, PathKind, ShadeErrors, Shaders, Shading};
+use crate::shade::{Lighting, OutputSet, PathKind, ShadeErrors, Shaders, Shading};
 
 /// Samples of a run of pixels that are traced together.
 const RUN_SAMPLES: usize = 4096;
+/// The same where rays branch, so that even deep trees of mirrors and glass stay small in memory.
+const RUN_SAMPLES_BRANCHING: usize = 1024;
 /// Most surfaces of opacity 0 that a ray passes before it is taken to leave the scene.
 const MOST_INVISIBLE: u32 = 256;
 
@@ -71,9 +73,12 @@ pub struct TileTracer<'a> {
     pub(super) world: &'a World,
     pub(super) lighting: &'a Lighting,
     positions: SamplePositions,
-    transparent: bool,
+    /// Whether rays that leave the scene let the page show through.
+    pub(super) transparent: bool,
     /// Width of a pixel's cone at the camera, and how much it widens per unit of distance.
     pub(super) cone: (f32, f32),
+    /// Outputs that mark a hit whose script failed, which no analysis of the script foresees.
+    pub(super) marker: OutputSet,
 }
 
 /// A thread's own memory and script engine.
@@ -123,18 +128,24 @@ impl<'a> TileTracer<'a> {
             positions: SamplePositions::new(settings.samples, settings.seed),
             transparent: settings.background == Background::Transparent,
             cone: (width, angle),
+            marker: {
+                let color = if plan.color { OutputSet::COLOR } else { OutputSet::empty() };
+                let width = if plan.lines.is_some() { OutputSet::LINE_WIDTH } else { OutputSet::empty() };
+                color | width
+            },
         }
     }
 
     /// Traces and shades all samples of a rectangle of pixels.
     pub fn trace(&self, rect: PixelRect, context: &mut TraceContext<'_>) -> TracedTile {
-        let start = Instant::now();
+        let clock = CpuClock::thread();
         let materials = self.scene.materials().len();
         let mut work =
             Work { rays: RayCounts::default(), hits: vec![0; materials], shade_seconds: vec![0.0; materials] };
         let mut samples = SampleBufferBuilder::new(rect, &self.plan.layout);
         let per_pixel = self.plan.layout.samples_per_pixel as usize;
-        let run_pixels = (RUN_SAMPLES / per_pixel).max(1);
+        let run_samples = if self.plan.has_secondary_rays() { RUN_SAMPLES_BRANCHING } else { RUN_SAMPLES };
+        let run_pixels = (run_samples / per_pixel).max(1);
         let mut first = 0;
         while first < rect.pixels() {
             let run = first..(first + run_pixels).min(rect.pixels());
@@ -143,7 +154,7 @@ impl<'a> TileTracer<'a> {
         }
         let samples = samples.finish();
         let Work { rays, hits, shade_seconds } = work;
-        TracedTile { samples, rays, hits, shade_seconds, seconds: start.elapsed().as_secs_f64() }
+        TracedTile { samples, rays, hits, shade_seconds, seconds: clock.seconds() }
     }
 
     fn trace_run(
@@ -179,7 +190,7 @@ impl<'a> TileTracer<'a> {
                 let offset = self.positions.offset(pixel, sample);
                 let (origin, direction) = self.scene.camera().ray(size, pixel, offset);
                 let node = run.nodes.len() as u32;
-                run.next.push(WaveRay { origin, direction, node, covered: 0.0, passed: 0 });
+                run.next.push(WaveRay { origin, direction, node, after: None, passed: 0 });
                 run.nodes.push(TreeNode::root(index as u32 * per_pixel + sample, self.cone.0));
                 offsets.push(offset);
             }
@@ -223,19 +234,20 @@ impl<'a> TileTracer<'a> {
                 }
             };
             let ray = Ray::new(wave_ray.origin, wave_ray.direction);
-            let found =
-                if wave_ray.passed < MOST_INVISIBLE { self.world.closest(&ray, kind, f32::INFINITY) } else { None };
+            let found = if wave_ray.passed < MOST_INVISIBLE {
+                self.world.next_hit(&ray, kind, f32::INFINITY, wave_ray.after)
+            } else {
+                None
+            };
             match found {
                 Some(hit) => {
                     let surface = Surface::new(self.world, &ray, &hit);
-                    let distance = wave_ray.covered + hit.t;
                     hits.push(WaveHit {
                         ray: *wave_ray,
                         hit,
                         surface,
                         material: self.world.material(&hit),
-                        distance,
-                        depth: node.length_before + distance,
+                        depth: node.length_before + hit.t,
                     });
                 }
                 None => {
@@ -254,7 +266,7 @@ impl<'a> TileTracer<'a> {
         for (root, offset) in offsets.iter().enumerate() {
             let node = &run.nodes[root];
             let color = SampleColor { color: node.radiance.to_array(), alpha: node.alpha };
-            samples.set_sample(node.sample, *offset, color, node.attributes.shader);
+            samples.set_sample(node.sample, *offset, color, node.culprit);
             if layout.position || layout.aovs > 0 {
                 let position = run.positions.get(root).copied().unwrap_or_default();
                 extras.clear();

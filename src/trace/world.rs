@@ -29,6 +29,17 @@ pub struct Hit {
     pub front: bool,
 }
 
+/// Where a hit stands among all hits of its ray: by distance, then by the lower object, then by the lower triangle.
+pub type HitRank = (f32, ObjectId, u32);
+
+impl Hit {
+    /// Its place among the hits of its ray.
+    #[must_use]
+    pub fn rank(&self) -> HitRank {
+        (self.t, self.object, self.triangle)
+    }
+}
+
 /// An object, placed relative to the camera.
 #[derive(Clone, Debug)]
 pub struct PlacedObject {
@@ -134,11 +145,18 @@ impl World {
     /// lowest object id and then the lowest triangle counts.
     #[must_use]
     pub fn closest(&self, ray: &Ray, kind: RayKinds, t_max: f32) -> Option<Hit> {
+        self.next_hit(ray, kind, t_max, None)
+    }
+
+    /// The first hit of a ray of one kind within `t_max` behind the one of rank `after`: the hit that the ray would
+    /// have if all up to there were absent, bit for bit, and be it at the same distance.
+    #[must_use]
+    pub fn next_hit(&self, ray: &Ray, kind: RayKinds, t_max: f32, after: Option<HitRank>) -> Option<Hit> {
         let mut best: Option<Hit> = None;
         self.each_hit(ray, kind, t_max, |hit, t_max| {
-            let closer =
-                best.is_none_or(|best| (hit.t, hit.object, hit.triangle) < (best.t, best.object, best.triangle));
-            if closer {
+            let rank = hit.rank();
+            let behind = after.is_none_or(|after| rank > after);
+            if behind && best.is_none_or(|best| rank < best.rank()) {
                 *t_max = hit.t;
                 best = Some(hit);
             }
