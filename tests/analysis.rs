@@ -1,4 +1,4 @@
-//! Script analysis: text goldens of what is known of small scripts,.
+//! Script analysis: text goldens of what is known of scripts. Its soundness is tested beside it.
 
 mod golden;
 mod shaders;
@@ -21,11 +21,6 @@ fn analysis(script: &str, params: &[(&str, Value)]) -> Analysis {
     let params: BTreeMap<String, Value> =
         params.iter().map(|(key, value)| ((*key).to_owned(), value.clone())).collect();
     analyse(&ast, &Params(Arc::new(params)), &[texture([51, 102, 0, 255], [102, 204, 0, 255])])
-}
-
-/// The body of a `surface` function.
-fn body(statements: &str) -> Analysis {
-    analysis(&format!("fn surface(hit, p) {{ {statements} }}"), &[])
 }
 
 /// Compares the dump of an analysis with lines of text.

@@ -21,3 +21,9 @@ pub mod world;
 
 pub use wave::{RayCounts, TileTracer, TraceContext};
 pub use world::World;
+
+/// Bound on the relative error of `n` roundings in a row (Higham; pbrt 4th edition, section 6.8.1).
+const fn gamma(n: u32) -> f32 {
+    let n_epsilon = n as f32 * f32::EPSILON * 0.5;
+    n_epsilon / (1.0 - n_epsilon)
+}

@@ -1,14 +1,9 @@
 //! From a hit to the surface there: place, error bounds, normals and vertex attributes.
 
+use super::gamma;
 use super::triangle::Ray;
 use super::world::{Hit, PlacedObject, World};
 use crate::math::{Vec2, Vec3, Vec4};
-
-/// Bound on the relative error of `n` roundings in a row (Higham; pbrt 4th edition, section 6.8.1).
-const fn gamma(n: u32) -> f32 {
-    let n_epsilon = n as f32 * f32::EPSILON * 0.5;
-    n_epsilon / (1.0 - n_epsilon)
-}
 
 /// The surface at a hit. Positions are relative to the camera's position, directions are in world space.
 #[derive(Clone, Copy, Debug)]

@@ -75,8 +75,8 @@ pub fn render_with(scene: &Scene, layers: &[Layer], options: &RenderOptions) -> 
         }
         Ok(())
     };
-    let report = render(scene, &shaders, &plan, options, &Control::default(), &emit)
-        .unwrap_or_else(|fault| panic!("{fault}"));
+    let report =
+        render(scene, &shaders, &plan, options, &Control::default(), &emit).unwrap_or_else(|fault| panic!("{fault}"));
     (picture.into_inner().expect("no thread panics with it"), report)
 }
 

@@ -44,13 +44,18 @@ fn a_camera_that_no_model_has() {
     };
     assert_eq!(
         said(&format!("[camera]\nnode = \"Shop\"\n{STAGE}"), None),
-        "scene.toml:2:8: error: there is no camera named `Shop` (did you mean `Shot`?)"
+        "scene.toml:2:8: error: there is no camera named `Shop` (did you mean `Shot`?)\n\
+         scene.toml:5:8: warning: stage.gltf: the model shows no triangles"
     );
     assert_eq!(
         said("[camera]\nnode = \"Shot\"\n[[objects]]\nshape = \"sphere\"", None),
         "scene.toml:2:8: error: there is no camera `Shot`: no model of this scene has cameras"
     );
-    assert_eq!(said(STAGE, Some("Shop")), "error: there is no camera named `Shop` (did you mean `Shot`?)");
+    assert_eq!(
+        said(STAGE, Some("Shop")),
+        "scene.toml:3:8: warning: stage.gltf: the model shows no triangles\n\
+         error: there is no camera named `Shop` (did you mean `Shot`?)"
+    );
 }
 
 #[test]

@@ -72,21 +72,19 @@ impl Walker<'_> {
     fn steps<'e>(&mut self, expression: &'e Expr) -> Flow<(&'e Expr, Vec<Step<'e>>)> {
         let mut steps = Vec::new();
         let mut root = None;
-        let mut link = expression;
-        loop {
-            let (Expr::Dot(sides, flags, position) | Expr::Index(sides, flags, position)) = link else { break };
+        let mut rest = Some(expression);
+        while let Some(link @ (Expr::Dot(sides, flags, position) | Expr::Index(sides, flags, position))) = rest {
             root.get_or_insert(&sides.lhs);
-            let is_index = matches!(link, Expr::Index(..));
-            let goes_on = matches!(sides.rhs, Expr::Dot(..) | Expr::Index(..)) && !flags.contains(ASTFlags::BREAK);
+            // The chain goes on inside the right side, unless that is a chain of its own, as in `a[b.c]`.
             let (item, next) = match &sides.rhs {
-                Expr::Dot(next, ..) | Expr::Index(next, ..) if goes_on => (&next.lhs, Some(&sides.rhs)),
+                next @ (Expr::Dot(inner, ..) | Expr::Index(inner, ..)) if !flags.contains(ASTFlags::BREAK) => {
+                    (&inner.lhs, Some(next))
+                }
                 last => (last, None),
             };
+            let is_index = matches!(link, Expr::Index(..));
             steps.push(self.one_step(item, is_index, flags.contains(ASTFlags::NEGATED), *position)?);
-            match next {
-                Some(next) => link = next,
-                None => break,
-            }
+            rest = next;
         }
         match root {
             Some(root) => Ok((root, steps)),
@@ -169,10 +167,31 @@ impl Walker<'_> {
 
     /// A binary operation.
     pub(super) fn binary(&mut self, operator: &str, a: &Abstract, b: &Abstract) -> Abstract {
+        if let ("+", Shape::Record(x), Shape::Record(y)) = (operator, &a.shape, &b.shape) {
+            return self.merged(x, y);
+        }
         match operators::binary(operator, &a.shape, &b.shape) {
             Some(shape) => self.value(shape, a.all_inputs() | b.all_inputs()),
             None => self.unknown([a, b]),
         }
+    }
+
+    /// A record with the keys of `a` and `b`; a key of both has the value of `b`.
+    pub(super) fn merged(&mut self, a: &Record, b: &Record) -> Abstract {
+        let mut merged = Record { is_params: false, ..a.clone() };
+        for (key, new) in &b.fields {
+            let field = match a.fields.get(key) {
+                Some(old) if !new.always => Field {
+                    value: self.join_values(&old.value, &new.value, new.presence),
+                    always: old.always,
+                    presence: old.presence | new.presence,
+                    place: new.place,
+                },
+                _ => new.clone(),
+            };
+            merged.fields.insert(Rc::clone(key), field);
+        }
+        self.constant(Shape::Record(Rc::new(merged)))
     }
 
     /// One step; with what the target is afterwards if a method has changed it.

@@ -4,6 +4,8 @@
 //! not known here (a plug-in's) are taken to be pure: their result is unknown and depends on their arguments. Of the
 //! engine's own functions those that change their first argument are listed.
 
+use std::f32::consts::PI;
+
 use rhai::Position;
 
 use super::geometry;
@@ -96,9 +98,8 @@ impl Walker<'_> {
     fn mutating_call(&mut self, name: &str, arguments: &[Abstract]) -> (Abstract, Option<Abstract>) {
         if let ("mixin", [a, b]) = (name, arguments)
             && let (Shape::Record(x), Shape::Record(y)) = (&a.shape, &b.shape)
-            && let Some(shape) = operators::merged(x, y)
         {
-            let merged = self.constant(shape);
+            let merged = self.merged(x, y);
             return (self.unit(), Some(merged));
         }
         (self.unknown(arguments), Some(self.unknown(arguments)))
@@ -183,8 +184,10 @@ fn channelwise(name: &str, arguments: &[&Shape]) -> Option<Shape> {
     }
 }
 
+/// The greatest angle that an inverse function gives, with room for its error.
+const HALF_TURN: f32 = PI * 1.000_001;
+
 fn scalar(name: &str, arguments: &[Interval]) -> Option<Interval> {
-    use std::f32::consts::PI;
     Some(match (name, arguments) {
         ("abs", [x]) => x.abs(),
         ("sign", [x]) => {
@@ -208,10 +211,10 @@ fn scalar(name: &str, arguments: &[Interval]) -> Option<Interval> {
         }),
         ("sin" | "cos", [x]) => Interval::within(1.0).or_nan(!x.is_finite()),
         ("tanh", [x]) => Interval::within(1.0).or_nan(x.nan),
-        ("atan", [x]) => Interval::within(1.571).or_nan(x.nan),
-        ("atan", [y, x]) => Interval::within(3.142).or_nan(x.nan || y.nan),
-        ("acos", [x]) if x.low >= -1.0 && x.high <= 1.0 => Interval::new(0.0, 3.142).or_nan(x.nan),
-        ("asin", [x]) if x.low >= -1.0 && x.high <= 1.0 => Interval::within(1.571).or_nan(x.nan),
+        ("atan", [x]) => Interval::within(HALF_TURN / 2.0).or_nan(x.nan),
+        ("atan", [y, x]) => Interval::within(HALF_TURN).or_nan(x.nan || y.nan),
+        ("acos", [x]) if x.low >= -1.0 && x.high <= 1.0 => Interval::new(0.0, HALF_TURN).or_nan(x.nan),
+        ("asin", [x]) if x.low >= -1.0 && x.high <= 1.0 => Interval::within(HALF_TURN / 2.0).or_nan(x.nan),
         ("tan" | "acos" | "asin" | "sinh" | "cosh" | "ln" | "log" | "log2", [_]) | ("log", [_, _]) => Interval::ANY,
         ("radians", [x]) => x.mul(Interval::exact(PI / 180.0)),
         ("degrees", [x]) => x.mul(Interval::exact(180.0 / PI)),
@@ -280,13 +283,16 @@ fn pattern(name: &str, arguments: &[&Shape]) -> Option<Shape> {
             color(if is_color && v.is_finite() { Interval::new(0.0, v.high) } else { Interval::ANY })
         }
         ("srgb" | "hsv_from_rgb", _) => color(Interval::ANY),
-        ("ramp", [t, Shape::Array(stops), ..]) if t.is_number() => ramp(stops),
+        ("ramp", [t, Shape::Array(stops), kind @ ..]) if t.is_number() => {
+            let constant = matches!(kind, [Shape::Text(Some(kind))] if &**kind == "constant");
+            ramp(stops, constant)
+        }
         _ => None,
     }
 }
 
-/// A mean of two neighbouring stops, or one of them; each stop is a position and a value.
-fn ramp(stops: &[Abstract]) -> Option<Shape> {
+/// A mean of two neighbouring stops, or one of them (always so if `constant`); each stop is a position and a value.
+fn ramp(stops: &[Abstract], constant: bool) -> Option<Shape> {
     let mut values = Vec::new();
     let mut positions_are_finite = true;
     for stop in stops {
@@ -304,7 +310,10 @@ fn ramp(stops: &[Abstract]) -> Option<Shape> {
     }
     let channel = |i: usize| {
         let ends = first.channels[i].hull(last.channels[i]);
-        let means = values.windows(2).map(|pair| pair[0].channels[i].mix(pair[1].channels[i], Interval::UNIT));
+        let means = values.windows(2).map(|pair| {
+            let (from, to) = (pair[0].channels[i], pair[1].channels[i]);
+            if constant { from.hull(to) } else { from.mix(to, Interval::UNIT) }
+        });
         let hull = means.fold(ends, Interval::hull);
         if positions_are_finite && values.iter().all(|v| v.channels[i].is_finite()) { hull } else { Interval::ANY }
     };

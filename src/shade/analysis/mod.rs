@@ -4,9 +4,9 @@
 //! depends on), with the material's parameters as constants. Branches that the parameters rule out are not walked, so a
 //! material without a texture reads no uv, and one whose metalness is 0 is no mirror.
 //!
-//! 1. [`interval`] bounds floats; [`value`] says what is known of a value, and joins what is known on two paths.
-//! 2. [`walk`] holds variables, calls and findings; [`statements`], [`expressions`] and [`chains`] walk the syntax tree.
-//! 3. [`operators`], [`functions`], [`geometry`] and [`inputs`] give the bounds of what scripts compute and read.
+//! 1. `interval` bounds floats; `value` says what is known of a value, and joins what is known on two paths.
+//! 2. `walk` holds variables, calls and findings; `statements`, `expressions` and `chains` walk the syntax tree.
+//! 3. `operators`, `functions`, `geometry` and [`inputs`] give the bounds of what scripts compute and read.
 //! 4. Here, the record that `surface` returns becomes an [`Analysis`].
 //!
 //! # What the facts promise
@@ -129,10 +129,11 @@ fn walk_surface(walker: &mut Walker, ast: &rhai::AST, params: &Params) -> Flow<O
     let mut fields = Record { is_params: true, ..Record::default() };
     for (name, value) in params.0.iter() {
         let shape = Shape::from_value(value, walker.textures.len(), &mut || walker.fresh());
-        let value = walker.constant(shape);
+        let value = Abstract::constant(shape, walker.fresh());
         fields.fields.insert(name.as_str().into(), Field::always(value, (0, 0)));
     }
-    let arguments = vec![walker.constant(Shape::Hit), walker.constant(Shape::Record(Rc::new(fields)))];
+    let parameters = Abstract::constant(Shape::Record(Rc::new(fields)), walker.fresh());
+    let arguments = vec![walker.constant(Shape::Hit), parameters];
     let returned = match walker.script_call(function, arguments, None, start) {
         Ok((value, _)) => value,
         Err(walk::Stop::Left) => return Ok(None),
@@ -140,7 +141,10 @@ fn walk_surface(walker: &mut Walker, ast: &rhai::AST, params: &Params) -> Flow<O
     };
     match returned.shape {
         Shape::Record(record) => Ok(Some(record)),
-        _ => walker.give_up(start, "what `surface` returns is not always a record with known keys and so"),
+        _ => {
+            let end = function.body.last().map_or(start, rhai::Stmt::position);
+            walker.give_up(end, "what `surface` returns, which is not always a record with known keys,")
+        }
     }
 }
 

@@ -3,7 +3,7 @@
 use std::rc::Rc;
 
 use super::interval::Interval;
-use super::value::{Record, Shape, Vector, mixed_number};
+use super::value::{Shape, Vector, mixed_number};
 
 /// The result of a unary operator; `None` if nothing is known of it.
 pub(super) fn unary(operator: &str, x: &Shape) -> Option<Shape> {
@@ -75,7 +75,6 @@ pub(super) fn binary(operator: &str, a: &Shape, b: &Shape) -> Option<Shape> {
             let text = a.as_ref().zip(b.as_ref()).filter(fits).map(|(a, b)| Rc::from(format!("{a}{b}")));
             Some(Shape::Text(text))
         }
-        (Shape::Record(a), Shape::Record(b)) if operator == "+" => merged(a, b),
         _ => None,
     }
 }
@@ -91,18 +90,6 @@ fn both(a: Option<bool>, b: Option<bool>) -> Option<bool> {
         (Some(true), Some(true)) => Some(true),
         _ => None,
     }
-}
-
-/// `b`'s keys put into `a`; `None` if it is open which of the two a key comes from.
-pub(super) fn merged(a: &Record, b: &Record) -> Option<Shape> {
-    let mut merged = Record { is_params: false, ..a.clone() };
-    for (key, field) in &b.fields {
-        if !field.always && a.fields.contains_key(key) {
-            return None;
-        }
-        merged.fields.insert(Rc::clone(key), field.clone());
-    }
-    Some(Shape::Record(Rc::new(merged)))
 }
 
 /// Operations on floats, the very ones of the script engine.

@@ -173,9 +173,11 @@ impl Shape {
     pub fn range(&self) -> Option<Interval> {
         match self {
             Self::Vector(vector) => Some(vector.hull()),
-            // `as` rounds to nearest, which may be inwards.
-            Self::Int(low, high) if *low < -EXACT_INT || *high > EXACT_INT => {
-                Some(Interval::new((*low as f32).next_down(), (*high as f32).next_up()))
+            Self::Int(low, high) => {
+                // `as` rounds to nearest, which may be inwards.
+                let is_rounded = |n: i64| n.unsigned_abs() > EXACT_INT as u64;
+                let outwards = |n: i64, step: fn(f32) -> f32| if is_rounded(n) { step(n as f32) } else { n as f32 };
+                Some(Interval::new(outwards(*low, f32::next_down), outwards(*high, f32::next_up)))
             }
             _ => self.number(),
         }
@@ -255,6 +257,22 @@ impl Abstract {
             Shape::Record(record) => record.fields.values().any(|field| field.value.holds_hit()),
             Shape::Array(items) => items.iter().any(Self::holds_hit),
             _ => false,
+        }
+    }
+
+    /// How many values it is made of, counted up to `limit`.
+    pub fn count_parts(&self, limit: usize) -> usize {
+        let count = |parts: &mut dyn Iterator<Item = &Self>| {
+            let mut total = 1;
+            while let Some(part) = parts.next().filter(|_| total < limit) {
+                total += part.count_parts(limit - total);
+            }
+            total
+        };
+        match &self.shape {
+            Shape::Record(record) => count(&mut record.fields.values().map(|field| &field.value)),
+            Shape::Array(items) => count(&mut items.iter()),
+            _ => 1,
         }
     }
 

@@ -15,6 +15,9 @@ use crate::shade::names::InputSet;
 const MAX_STEPS: u32 = 400_000;
 /// Expressions after which loops are no longer walked round by round.
 const MAX_STEPS_UNROLLED: u32 = 100_000;
+/// Values in one record or array, those in its parts included. Parts are shared, so that a script could build a value
+/// of astronomic size in a few lines; the engine's own limits end such a script.
+const MAX_PARTS: usize = 2048;
 /// Calls inside calls.
 const MAX_CALL_DEPTH: usize = 24;
 
@@ -154,7 +157,13 @@ impl<'a> Walker<'a> {
 
     /// A new value. One that is exactly known depends on nothing.
     pub fn value(&mut self, shape: Shape, inputs: InputSet) -> Abstract {
-        let inputs = if shape.is_exact() || shape.is_container() { InputSet::empty() } else { inputs };
+        if shape.is_container() {
+            let whole = Abstract::constant(shape, self.fresh());
+            let parts = whole.count_parts(MAX_PARTS);
+            self.steps += u32::try_from(parts / 16).unwrap_or(u32::MAX);
+            return if parts < MAX_PARTS { whole } else { self.unknown([&whole]) };
+        }
+        let inputs = if shape.is_exact() { InputSet::empty() } else { inputs };
         Abstract { identity: self.fresh(), shape, inputs }
     }
 
