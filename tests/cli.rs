@@ -159,6 +159,9 @@ fn bad_flags_are_bad_usage() {
         &["render", "scene.toml", "--lines", "thick"],
         &["render", "scene.toml", "--threads", "0"],
         &["render", "scene.toml", "-o", "a.png", "-o", "a.png"],
+        &["render", "scene.toml", "-o", "a.png", "-o", "./a.png"],
+        &["compare", "a.png", "a.png", "--tolerance", "nan"],
+        &["compare", "a.png", "a.png", "--tolerance", "-1"],
         &["no-such-command"],
     ] {
         place.run(arguments).exits(2);
@@ -197,6 +200,73 @@ fn an_empty_scene_is_a_picture_of_the_background_and_a_warning() {
 }
 
 #[test]
+fn faults_of_a_scene_have_a_place_and_leave_no_picture() {
+    let cases = [
+        ("[render]", "[render", "scene.toml:2:8", "not valid TOML"),
+        ("size = [32, 24]", "size = [32, 24", "scene.toml:4:1", "closing `]`"),
+        ("samples = 2", "samples = true", "scene.toml:4:11", "whole number"),
+        ("samples = 2", "samples = nan", "scene.toml:4:11", "nan"),
+        ("samples = 2", "samples = 99999999999999999999", "scene.toml:4:11", "99999999999999999999"),
+        ("size = [32, 24]", "size = [1000000, 1000000]", "scene.toml:3:8", "4294967296 are the most"),
+        ("position = [0.0, 0.0, 5.0]", "position = [0, 0, -inf]", "scene.toml:7:19", "-inf"),
+        ("position = [0.0, 0.0, 5.0]", "position = [0, 0, 0]", "scene.toml:8:10", "looks at itself"),
+        ("\"sphere\"", "\"spere\"", "scene.toml:15:9", "`sphere`"),
+        ("material = \"ink\"", "material = \"inc\"", "scene.toml:16:12", "`ink`"),
+    ];
+    for (from, to, at, expected) in cases {
+        let place = with_scene(from, to);
+        let run = place.run(&["render", "scene.toml"]).exits(1).says(at).says(expected);
+        assert!(!run.stderr().contains("2 errors"), "{}", run.stderr());
+        assert!(!place.folder.path().join("scene.png").exists());
+    }
+}
+
+/// A model of one triangle.
+const TRIANGLE: &str = r#"{
+    "asset": { "version": "2.0" },
+    "scenes": [{ "nodes": [0] }],
+    "nodes": [{ "mesh": 0 }, { "children": [] }],
+    "meshes": [{ "primitives": [{ "attributes": { "POSITION": 0 }, "material": 0 }] }],
+    "materials": [{ "name": "plain" }],
+    "textures": [{ "source": 0 }],
+    "images": [{ "uri": "not there.png" }],
+    "accessors": [{ "bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3" }],
+    "bufferViews": [{ "buffer": 0, "byteLength": 36 }],
+    "buffers": [{ "byteLength": 36, "uri": "data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA" }]
+}"#;
+
+#[test]
+fn faults_of_a_model_are_told_and_leave_no_picture() {
+    let textured = r#""name": "plain", "pbrMetallicRoughness": { "baseColorTexture": { "index": 0 } }"#;
+    let cases = [
+        ("\"count\": 3", "\"count\": 4", "accessors[0]"),
+        ("\"bufferView\": 0,", "\"bufferView\": 7,", "bufferView"),
+        ("\"mesh\": 0", "\"mesh\": 0, \"children\": [0]", "nodes[0]"),
+        ("\"name\": \"plain\"", textured, "not there.png"),
+        ("\"2.0\"", "\"2.0\" \"", "model.gltf:2:"),
+    ];
+    for (from, to, expected) in cases {
+        assert!(TRIANGLE.contains(from));
+        let place = Workplace::new();
+        place.file("model.gltf", TRIANGLE.replace(from, to));
+        place.run(&["render", "model.gltf", "--size", "8x8"]).exits(1).says("model.gltf").says(expected);
+        assert!(!place.folder.path().join("model.png").exists());
+    }
+
+    let place = Workplace::new();
+    place.file("model.gltf", TRIANGLE);
+    place.run(&["render", "model.gltf", "--size", "8x8"]).exits(0);
+    let mut model = b"glTF\x02\0\0\0\xff\0\0\0".to_vec();
+    model.extend((TRIANGLE.len() as u32).to_le_bytes());
+    model.extend(b"JSON");
+    model.extend(TRIANGLE.as_bytes());
+    for length in [5, 11, 17, 100, model.len()] {
+        place.file("cut.glb", &model[..length]);
+        place.run(&["render", "cut.glb", "--size", "8x8"]).exits(1).says("cut.glb").says("cut off");
+    }
+}
+
+#[test]
 fn scripts_report_file_line_and_column() {
     let cases = [
         ("fn surface(hit, p) { #{ color: rgb(1, 0, 0) ", "ink.rhai:1:"),
@@ -204,6 +274,8 @@ fn scripts_report_file_line_and_column() {
         ("fn surface(hit, p) {\n    #{ line_widht: 2.0 }\n}", "line_width"),
         ("fn surface(hit, p) {\n    #{ feature: gray(hit.positon.x) }\n}", "position"),
         ("fn surface(hit, p) {\n    #{ line_width: \"thick\" }\n}", "line_width"),
+        ("fn surface(hit, p) {\n    #{ color: hit.uv.x > 0.5 }\n}", "ink.rhai:2:"),
+        ("\nfn surface(hit, p) { 5 }", "ink.rhai:2:"),
     ];
     for (script, expected) in cases {
         with_script(script).run(&["render", "scene.toml"]).exits(1).says("ink.rhai").says(expected);
@@ -241,6 +313,8 @@ fn outputs_that_cannot_be_written_are_said_and_the_old_file_survives() {
     let place = place();
     place.run(&["render", "scene.toml", "-o", "no/such/folder/a.png"]).exits(1).says("no/such/folder");
     place.run(&["render", "scene.toml", "-o", "a.bmp"]).exits(1).says("png").says("exr");
+    place.run(&["render", "scene.toml", "--stats", "no/such/stats.json"]).exits(1).says("no/such/stats.json");
+    assert!(!place.folder.path().join("scene.png").exists(), "told before rendering");
     let old = place.file("b.png", "old");
     let broken = with_script("fn surface(");
     fs::copy(broken.folder.path().join("ink.rhai"), place.folder.path().join("ink.rhai")).expect("files can be copied");
@@ -280,4 +354,110 @@ fn a_reader_that_goes_away_is_no_failure() {
     let line = format!("{} schema | head -c 1 >/dev/null; exit ${{PIPESTATUS[0]}}", env!("CARGO_BIN_EXE_tusche"));
     let status = std::process::Command::new("bash").args(["-c", &line]).status().expect("bash can be run");
     assert_eq!(status.code(), Some(0));
+}
+
+#[test]
+fn paths_are_relative_to_the_file_that_names_them() {
+    let place = Workplace::new();
+    let place_scene = SCENE
+        .replace("ink.rhai", "../the looks/ink.rhai")
+        .replace("[[objects]]", "params = { image = { texture = \"../the looks/tex/noise.png\" } }\n\n[[objects]]");
+    place.file("deep/er/scène.toml", place_scene);
+    let script = "fn params() { #{ image: () } }\nfn surface(hit, p) { #{ color: hit.texture(p.image).rgb } }\n";
+    place.file("deep/the looks/ink.rhai", script);
+    let scene = ["render", "deep/er/scène.toml", "--size", "8x8", "-o"];
+    place.run(&[&scene[..], &["out.png"]].concat()).exits(1).says("noise.png").says("scène.toml:13:");
+    place.file("plain.toml", "");
+    fs::create_dir(place.folder.path().join("deep/the looks/tex")).expect("folders can be made");
+    place.run(&["render", "plain.toml", "--size", "4x4", "-o", "deep/the looks/tex/noise.png"]).exits(0);
+    place.run(&[&scene[..], &["deep/out.png"]].concat()).exits(0);
+    assert!(place.folder.path().join("deep/out.png").exists());
+}
+
+#[cfg(unix)]
+#[test]
+fn a_symbolic_link_stays_and_its_target_is_written() {
+    use std::os::unix::fs::symlink;
+    let place = place();
+    let folder = place.folder.path();
+    fs::create_dir(folder.join("real")).expect("folders can be made");
+    for (link, target) in [("a.png", "real/a.png"), ("lost.png", "gone/a.png"), ("round.png", "round.png")] {
+        symlink(target, folder.join(link)).expect("links can be made");
+    }
+    for _ in ["the target is new", "the target is there"] {
+        place.run(&["render", "scene.toml", "-o", "a.png"]).exits(0);
+        assert!(folder.join("a.png").is_symlink());
+        assert!(folder.join("real/a.png").is_file());
+    }
+    place.run(&["render", "scene.toml", "-o", "a.png", "-o", "real/a.png"]).exits(2);
+    place.run(&["render", "scene.toml", "-o", "lost.png"]).exits(1).says("lost.png").says("gone");
+    assert!(folder.join("lost.png").is_symlink());
+}
+
+/// A file as large as the process may write stands for a full disk.
+#[cfg(unix)]
+#[test]
+fn the_old_file_survives_a_disk_that_fills() {
+    let place = place();
+    for name in ["a.exr", "a.png"] {
+        let old = place.file(name, "old");
+        let tusche = env!("CARGO_BIN_EXE_tusche");
+        let line = format!("trap '' XFSZ; ulimit -f 1; exec {tusche} render scene.toml --size 300x200 -o {name}");
+        let run = std::process::Command::new("bash").args(["-c", &line]).current_dir(place.folder.path()).output();
+        let run = run.expect("bash can be run");
+        let said = String::from_utf8_lossy(&run.stderr);
+        assert_eq!(run.status.code(), Some(1), "{said}");
+        assert!(said.contains(&format!("{name}: cannot write this file")), "{said}");
+        assert_eq!(fs::read(&old).expect("it is still there"), b"old");
+        fs::remove_file(old).expect("it can be removed");
+        let left = fs::read_dir(place.folder.path()).expect("it can be listed").count();
+        assert_eq!(left, 2, "only the scene and its script are left");
+    }
+}
+
+/// Starts a render of minutes, interrupts it twice after a while, and returns what it said.
+#[cfg(unix)]
+fn interrupted(place: &Workplace, pause: std::time::Duration) -> std::process::Output {
+    use std::process::{Command, Stdio};
+    let mut command = Command::new(env!("CARGO_BIN_EXE_tusche"));
+    command.args(["render", "scene.toml", "--size", "32x16384", "--samples", "256", "--layer", "rgba"]);
+    command.args(["-o", "a.png", "-o", "a.exr"]).current_dir(place.folder.path());
+    let child = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().expect("the command can be run");
+    std::thread::sleep(pause);
+    for _ in 0..2 {
+        // The second may come too late, which is fine.
+        let _ = Command::new("kill").args(["-INT", &child.id().to_string()]).stderr(Stdio::null()).status();
+    }
+    child.wait_with_output().expect("it ends")
+}
+
+#[cfg(unix)]
+#[test]
+fn ctrl_c_leaves_valid_files_of_what_is_done_and_says_so() {
+    use std::time::Duration;
+    use tusche::film::Picture;
+    let place = with_script("fn surface(hit, p) { #{ color: rgb(0.5 + 0.5 * abs(hit.normal.x), 0.7, 0.5) } }\n");
+    let old = place.file("a.png", "old");
+    // How long the start takes depends on the machine: wait longer until some pixels were done before the signal.
+    for seconds in [1, 2, 4, 8, 16, 32] {
+        let run = interrupted(&place, Duration::from_secs(seconds));
+        let said = String::from_utf8_lossy(&run.stderr);
+        let Some(code) = run.status.code() else { continue };
+        assert_eq!(code, 1, "{said}");
+        assert!(said.contains("stopped before the picture was complete"), "{said}");
+        assert!(said.contains("what is done is in a.png and a.exr"), "{said}");
+        assert_eq!(fs::read_dir(place.folder.path()).expect("it can be listed").count(), 4);
+        let rows = [old.clone(), old.with_extension("exr")].map(|path| {
+            let picture = Picture::read(&path).unwrap_or_else(|fault| panic!("{fault}"));
+            assert_eq!(picture.size(), [32, 16384]);
+            let green = picture.channel("G").expect("it has colours");
+            green.chunks(32).filter(|row| row.iter().all(|value| *value > 0.0)).count()
+        });
+        assert_eq!(rows[0], rows[1], "both files hold the same part");
+        if rows[0] > 0 {
+            assert!(rows[0] < 16384, "the render is too short for this test");
+            return;
+        }
+    }
+    panic!("no pixel was done in half a minute");
 }

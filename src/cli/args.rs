@@ -130,11 +130,18 @@ pub struct CompareArguments {
     #[arg(value_name = "B")]
     pub actual: PathBuf,
     /// The largest difference of any channel of any pixel that still counts as equal.
-    #[arg(long, value_name = "D", default_value_t = 0.0)]
+    #[arg(long, value_name = "D", default_value = "0", allow_negative_numbers = true, value_parser = tolerance)]
     pub tolerance: f64,
     /// Prints the figures as JSON.
     #[arg(long)]
     pub json: bool,
+}
+
+fn tolerance(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(tolerance) if tolerance >= 0.0 => Ok(tolerance),
+        _ => Err("it must be a number of at least 0".into()),
+    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]

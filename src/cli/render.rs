@@ -9,6 +9,7 @@ use super::args::RenderArguments;
 use super::request::{Request, output_paths};
 use super::{Failure, terminal};
 use crate::diag::{Diagnostic, Diagnostics};
+use crate::film::{check_writable, write_atomically};
 use crate::render::{Control, RenderOptions, Report, render_files};
 use crate::sample::PixelRect;
 
@@ -62,6 +63,9 @@ fn render_frame(
             size[0], size[1]
         )));
     }
+    if let Some(path) = &arguments.stats {
+        check_writable(path)?;
+    }
     let quiet = arguments.scene.quiet;
     let label = frame.map_or_else(String::new, |frame| format!("frame {frame}"));
     let progress = terminal::Progress::new(!quiet, label);
@@ -99,8 +103,10 @@ fn conclude(arguments: &RenderArguments, request: &Request, report: Report) -> R
         terminal::say(&report.script_errors);
     }
     if !report.complete {
-        let fault = Diagnostic::error("stopped before the picture was complete; what is done has been written")
-            .hint("the rest of the file is transparent black; run the same command again for the whole picture");
+        let files: Vec<String> = request.files.iter().map(|file| file.path.display().to_string()).collect();
+        let fault = Diagnostic::error("stopped before the picture was complete")
+            .hint(format!("what is done is in {}; the rest is transparent black", files.join(" and ")))
+            .hint("run the same command again for the whole picture");
         return Err(Diagnostics::from(fault).into());
     }
     if failed && !arguments.keep_going { Err(Failure::Silent) } else { Ok(()) }
@@ -109,6 +115,5 @@ fn conclude(arguments: &RenderArguments, request: &Request, report: Report) -> R
 fn write_stats(path: &Path, report: &Report) -> Result<(), Diagnostic> {
     let text = serde_json::to_string_pretty(&report.stats)
         .map_err(|error| Diagnostic::error(format!("cannot write the statistics: {error}")))?;
-    std::fs::write(path, text + "\n")
-        .map_err(|error| Diagnostic::error(format!("cannot write this file: {error}")).in_file(path))
+    write_atomically(path, |sink| sink.write_all((text + "\n").as_bytes()))
 }

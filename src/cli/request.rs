@@ -51,12 +51,22 @@ pub(super) fn output_paths(arguments: &SceneArguments) -> Result<Vec<PathBuf>, F
         let stem = arguments.scene.file_stem().unwrap_or("picture".as_ref());
         return Ok(vec![Path::new(stem).with_extension("png")]);
     }
+    let places: Vec<PathBuf> = arguments.output.iter().map(|path| place(path)).collect();
     for (index, path) in arguments.output.iter().enumerate() {
-        if arguments.output[..index].contains(path) {
+        if places[..index].contains(&places[index]) {
             return Err(Failure::Usage(format!("`{}` is given twice as output", path.display())));
         }
     }
     Ok(arguments.output.clone())
+}
+
+/// The one spelling of a path by which two names of the same file are known.
+fn place(path: &Path) -> PathBuf {
+    let named = || {
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        Some(folder.canonicalize().ok()?.join(path.file_name()?))
+    };
+    path.canonicalize().ok().or_else(named).unwrap_or_else(|| path.to_owned())
 }
 
 fn load(

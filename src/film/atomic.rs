@@ -32,7 +32,7 @@ pub(super) struct Target {
 impl Target {
     pub(super) fn new(path: &Path) -> Result<Self, Diagnostic> {
         let error = |message: &str| Diagnostic::error(message).in_file(path);
-        let real = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+        let real = followed(path);
         match fs::metadata(&real) {
             Ok(old) if old.is_dir() => {
                 return Err(error("cannot write here: this is a folder").hint("add the name of a file"));
@@ -100,6 +100,32 @@ impl Target {
             None => diagnostic,
         }
     }
+}
+
+/// The path with symbolic links followed, even to a file that does not exist yet.
+fn followed(path: &Path) -> PathBuf {
+    /// As many as Linux follows; a longer chain is a circle.
+    const MOST_LINKS: usize = 40;
+    let mut real = path.to_owned();
+    for _ in 0..MOST_LINKS {
+        if let Ok(found) = fs::canonicalize(&real) {
+            return found;
+        }
+        match fs::read_link(&real) {
+            Ok(next) => real = real.parent().unwrap_or(Path::new("")).join(next),
+            Err(_) => return real,
+        }
+    }
+    path.to_owned()
+}
+
+/// Whether [`write_atomically`] could begin now: better told before hours of work than after.
+///
+/// # Errors
+/// If the folder is missing or takes no new files, or the target is not a plain file.
+pub fn check_writable(path: &Path) -> Result<(), Diagnostic> {
+    let target = Target::new(path)?;
+    target.spool().map(drop).map_err(|error| target.failure(&error))
 }
 
 #[cfg(test)]

@@ -16,7 +16,7 @@ pub mod picture;
 mod png;
 mod spread;
 
-pub use atomic::write_atomically;
+pub use atomic::{check_writable, write_atomically};
 pub use compare::{Comparison, compare, write_difference};
 pub use develop::{FilmWindow, develop};
 pub use filter::Filter;

@@ -7,6 +7,8 @@ use crate::diag::{Diagnostic, Diagnostics, Span};
 
 /// The largest width or height of a picture: EXR and PNG readers stop near here.
 pub(super) const MAX_SIZE: u32 = 1 << 20;
+/// The most pixels of a picture: 65536 × 65536. Beyond, even writing an unfinished file takes hours.
+pub(super) const MAX_PIXELS: u64 = 1 << 32;
 /// The most samples a pixel can have.
 pub(super) const MAX_SAMPLES: u32 = 1 << 14;
 /// The widest line, in pixels.
@@ -71,6 +73,10 @@ fn check_settings(scene: &SceneBuilder, faults: &mut Diagnostics) {
     require(
         render.size.iter().all(|n| (1..=MAX_SIZE).contains(n)),
         format!("picture size must be 1 to {MAX_SIZE} pixels each way"),
+    );
+    require(
+        render.size.iter().map(|n| u64::from(*n)).product::<u64>() <= MAX_PIXELS,
+        format!("a picture can have at most {MAX_PIXELS} pixels"),
     );
     require((1..=MAX_SAMPLES).contains(&render.samples), format!("samples must be 1 to {MAX_SAMPLES}"));
     require(

@@ -3,6 +3,7 @@
 //! [`Node`]s of one tree may come from several sources: a `--set` override brings its own. The types of
 //! [`format`](super::format) stay free of places; who needs one walks this tree beside the typed value.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use toml::Spanned;
@@ -127,11 +128,20 @@ fn syntax_errors(source: &Arc<Source>, offset: usize, errors: Vec<toml::de::Erro
     places.sort_by_key(|(range, _)| range.start);
     let bytes = source.text.as_bytes();
     places.dedup_by(|(next, _), (kept, _)| !bytes[kept.start..next.start].contains(&b'\n'));
+    // An array that is not closed takes in all that follows, and the parser misses a comma before each line of it.
+    let begins_line = |at: usize| bytes[..at].iter().rev().find(|byte| !matches!(byte, b' ' | b'\t')) == Some(&b'\n');
+    let misses_comma = |(range, message): &(Range<usize>, &str)| {
+        message.starts_with("missing comma between array elements") && begins_line(range.start)
+    };
+    places.dedup_by(|next, kept| misses_comma(next) && misses_comma(kept));
     let untold = places.len().saturating_sub(MOST_TOLD);
     places.truncate(MOST_TOLD);
     let mut faults = Diagnostics::default();
-    for (range, message) in places {
-        faults.push(Diagnostic::error(format!("this is not valid TOML: {message}")).at(Span::new(source, range)));
+    for place in places {
+        let hint = misses_comma(&place).then_some("or is a closing `]` missing above?");
+        let (range, message) = place;
+        let fault = Diagnostic::error(format!("this is not valid TOML: {message}")).at(Span::new(source, range));
+        faults.push(hint.into_iter().fold(fault, Diagnostic::hint));
     }
     if untold > 0 {
         faults.push(Diagnostic::error(format!("{}: {untold} more lines are not valid TOML", source.name)));

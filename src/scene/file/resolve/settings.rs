@@ -5,6 +5,7 @@ use super::super::format;
 use super::{Resolver, rgb};
 use crate::diag::Diagnostic;
 use crate::math::Vec3;
+use crate::scene::check::MAX_PIXELS;
 use crate::scene::settings::{Background, Composition, FilterKind, LineSettings, RayKinds, RenderSettings};
 use crate::scene::texture::{Texture, TextureFilter, Wrap};
 
@@ -16,6 +17,10 @@ impl Resolver<'_> {
             let span = ["refraction_depth", "reflection_depth"].iter().find_map(|key| node.get(key)).unwrap_or(node);
             let message = format!("`reflection_depth` and `refraction_depth` add up to {depth}: 30 is the most");
             self.fault(message, span.span.clone());
+        }
+        let pixels: u64 = render.size.iter().map(|n| u64::from(*n)).product();
+        if pixels > MAX_PIXELS {
+            self.fault(format!("`size` makes {pixels} pixels: {MAX_PIXELS} are the most"), node.span_of("size"));
         }
         if render.strata.is_some_and(|strata| strata != 1) {
             let warning = Diagnostic::warning("strata are not built yet: `strata` is ignored");
