@@ -22,9 +22,9 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<(), Failure> {
     let _ = ctrlc::set_handler(move || on_signal.store(true, Ordering::Relaxed));
 
     let Some(range) = arguments.frames else {
-        return render_frame(arguments, arguments.scene.frame, &outputs, &cancel);
+        return render_frame(arguments, arguments.scene.frame, &outputs, arguments.stats.as_deref(), &cancel);
     };
-    if let Some(path) = outputs.iter().find(|path| numbered(path, 0).is_none()) {
+    if let Some(path) = outputs.iter().chain(&arguments.stats).find(|path| numbered(path, 0).is_none()) {
         return Err(Failure::Usage(format!(
             "--frames needs a place for the frame number in `{}`: write for example `picture.####.png`",
             path.display()
@@ -32,7 +32,8 @@ pub(super) fn run(arguments: &RenderArguments) -> Result<(), Failure> {
     }
     for frame in range.first..=range.last {
         let outputs: Vec<PathBuf> = outputs.iter().filter_map(|path| numbered(path, frame)).collect();
-        render_frame(arguments, Some(f64::from(frame)), &outputs, &cancel)?;
+        let stats = arguments.stats.as_deref().and_then(|path| numbered(path, frame));
+        render_frame(arguments, Some(f64::from(frame)), &outputs, stats.as_deref(), &cancel)?;
     }
     Ok(())
 }
@@ -50,6 +51,7 @@ fn render_frame(
     arguments: &RenderArguments,
     frame: Option<f64>,
     outputs: &[PathBuf],
+    stats: Option<&Path>,
     cancel: &AtomicBool,
 ) -> Result<(), Failure> {
     let start = Instant::now();
@@ -63,7 +65,7 @@ fn render_frame(
             size[0], size[1]
         )));
     }
-    if let Some(path) = &arguments.stats {
+    if let Some(path) = stats {
         check_writable(path)?;
     }
     let quiet = arguments.scene.quiet;
@@ -83,17 +85,24 @@ fn render_frame(
     let mut report = result?;
     report.stats.seconds.load = *load_seconds;
     report.stats.seconds.total = start.elapsed().as_secs_f64();
-    conclude(arguments, &request, report)
+    conclude(arguments, &request, stats, report)
 }
 
 /// Says what happened, writes `--stats`, and decides about success.
-fn conclude(arguments: &RenderArguments, request: &Request, report: Report) -> Result<(), Failure> {
+fn conclude(
+    arguments: &RenderArguments,
+    request: &Request,
+    stats: Option<&Path>,
+    report: Report,
+) -> Result<(), Failure> {
     let quiet = arguments.scene.quiet;
-    if let Some(path) = &arguments.stats {
+    if let Some(path) = stats {
         write_stats(path, &report)?;
     }
     if !quiet {
         terminal::say(&report.warnings);
+    }
+    if !quiet && report.written {
         for file in &request.files {
             terminal::note(&format!("wrote {} ({:.1} s)", file.path.display(), report.stats.seconds.total));
         }
@@ -104,9 +113,13 @@ fn conclude(arguments: &RenderArguments, request: &Request, report: Report) -> R
     }
     if !report.complete {
         let files: Vec<String> = request.files.iter().map(|file| file.path.display().to_string()).collect();
-        let fault = Diagnostic::error("stopped before the picture was complete")
-            .hint(format!("what is done is in {}; the rest is transparent black", files.join(" and ")))
-            .hint("run the same command again for the whole picture");
+        let fault = Diagnostic::error("stopped before the picture was complete");
+        let fault = if report.written {
+            fault.hint(format!("what is done is in {}; the rest is transparent black", files.join(" and ")))
+        } else {
+            fault.hint("nothing was done yet, and nothing was written")
+        };
+        let fault = fault.hint("run the same command again for the whole picture");
         return Err(Diagnostics::from(fault).into());
     }
     if failed && !arguments.keep_going { Err(Failure::Silent) } else { Ok(()) }

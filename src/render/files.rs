@@ -1,6 +1,7 @@
 //! Rendering straight into picture files.
 
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use super::{Control, RenderOptions, Report, render};
@@ -32,7 +33,7 @@ pub fn layers_of(files: &[PictureFile]) -> Vec<Layer> {
 }
 
 /// Renders a scene into files. They get their names once all is done; if the render is cancelled they hold what was
-/// finished, and transparent black elsewhere.
+/// finished, and transparent black elsewhere. If nothing at all was finished, nothing is written.
 ///
 /// # Errors
 /// If a file cannot be written, or a layer is not in the plan; files that were there before are then untouched.
@@ -46,11 +47,16 @@ pub fn render_files(
 ) -> Result<Report, Diagnostic> {
     let start = Instant::now();
     let outputs = files.iter().map(|file| Part::open(scene, plan, file, options)).collect::<Result<Vec<_>, _>>()?;
+    let begun = AtomicBool::new(false);
     let mut report = render(scene, shaders, plan, options, control, &|tile| {
+        begun.store(true, Ordering::Relaxed);
         outputs.iter().try_for_each(|part| part.output.write(&part.of(tile)))
     })?;
     let finish = CpuClock::thread();
-    outputs.into_iter().try_for_each(|part| part.output.finish())?;
+    report.written = report.complete || begun.into_inner();
+    if report.written {
+        outputs.into_iter().try_for_each(|part| part.output.finish())?;
+    }
     report.stats.seconds.film += finish.seconds();
     report.stats.seconds.total = start.elapsed().as_secs_f64();
     Ok(report)

@@ -70,6 +70,8 @@ pub struct Report {
     pub warnings: Diagnostics,
     /// Whether every tile was rendered (false after a cancel).
     pub complete: bool,
+    /// Whether picture files were written; set by [`render_files`] alone.
+    pub written: bool,
 }
 
 /// Takes finished tiles of the plan's layers: called from any thread, in any order, each pixel once.
@@ -376,6 +378,7 @@ impl<'a> Render<'a> {
             script_errors: errors.into_diagnostics(),
             warnings: gate_warnings(self.scene, &totals.gate),
             complete: self.complete,
+            written: false,
         }
     }
 }

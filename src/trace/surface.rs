@@ -125,8 +125,10 @@ impl Surface {
         let tangent = (tangent - self.normal * self.normal.dot(tangent))
             .try_normalize()
             .unwrap_or_else(|| crate::math::frame(self.normal).0);
-        // The shading normal was turned towards the ray; the bitangent must not turn with it.
-        tangent.extend(if self.front { handedness } else { -handedness })
+        // The cross product of normal and tangent turns round with the normal, which was turned towards the ray, and in
+        // a mirrored object; the bitangent must not.
+        let turned = !self.front != (object.world_from_object.determinant() < 0.0);
+        tangent.extend(if turned { -handedness } else { handedness })
     }
 
     /// Mean curvature in 1 / world units, from how the vertex normals turn over the triangle; positive where the side

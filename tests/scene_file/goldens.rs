@@ -1,6 +1,6 @@
 //! Exact messages: each file in `tests/golden/scene_file` holds a scene, and below a line of dashes what is said about it.
 //!
-//! Lines that start with `--set` or `--camera` at the top are arguments. `BLESS=1 cargo test` writes what is said now.
+//! Lines that start with `--set` or `--camera` at the top are arguments. `TUSCHE_BLESS=1 cargo test` writes what is said now.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -23,7 +23,7 @@ fn messages_are_as_recorded() {
         if said == recorded {
             continue;
         }
-        if std::env::var_os("BLESS").is_some() {
+        if std::env::var_os("TUSCHE_BLESS").is_some() {
             std::fs::write(&path, format!("{input}{RULE}{said}")).unwrap();
         }
         failed.push(format!("{}\n--- recorded\n{recorded}\n--- now\n{said}", path.display()));
