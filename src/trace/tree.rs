@@ -28,7 +28,6 @@ pub struct BoxTree {
     nodes: Vec<Bvh2Node>,
     /// The box of each place in the leaves, as an index into the boxes that the tree was built over.
     pub order: Vec<u32>,
-    depth: usize,
 }
 
 impl std::fmt::Debug for BoxTree {
@@ -44,9 +43,9 @@ impl BoxTree {
         if boxes.is_empty() {
             return Self::default();
         }
-        let Bvh2 { nodes, primitive_indices, max_depth, .. } =
+        let Bvh2 { nodes, primitive_indices, .. } =
             build_bvh2(boxes, BvhBuildParams::medium_build(), &mut Duration::default());
-        Self { nodes, order: primitive_indices, depth: max_depth }
+        Self { nodes, order: primitive_indices }
     }
 
     /// The box around everything.
@@ -88,7 +87,7 @@ impl BoxTree {
             visit(leaf(root), t_max);
             return;
         }
-        let mut stack = Stack::new(self.depth);
+        let mut stack = Stack::new();
         let mut pair = root.first_index as usize;
         loop {
             let (mut left, mut right) = (&self.nodes[pair], &self.nodes[pair + 1]);
@@ -132,7 +131,8 @@ impl BoxTree {
     }
 }
 
-/// Postponed nodes: on the stack for the depths that trees have, on the heap beyond.
+/// Postponed nodes: on the stack for the depths that rays go to, on the heap beyond. Clearing it is part of the cost of
+/// every ray, so it is no larger than needed.
 struct Stack {
     inline: [(u32, f32); Self::INLINE],
     length: usize,
@@ -140,11 +140,10 @@ struct Stack {
 }
 
 impl Stack {
-    const INLINE: usize = 64;
+    const INLINE: usize = 32;
 
-    fn new(depth: usize) -> Self {
-        let beyond = if depth > Self::INLINE { Vec::with_capacity(depth - Self::INLINE) } else { Vec::new() };
-        Self { inline: [(0, 0.0); Self::INLINE], length: 0, beyond }
+    fn new() -> Self {
+        Self { inline: [(0, 0.0); Self::INLINE], length: 0, beyond: Vec::new() }
     }
 
     #[inline]
