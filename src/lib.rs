@@ -8,7 +8,7 @@
 //! 3. [`plan`]: what this scene needs is derived once; everything below obeys.
 //! 4. [`trace`]: tiles of pixels are traced in waves of rays, and hits are shaded in batches.
 //! 5. [`sample`]: the nodes of the ray trees become columns, past the one gate where NaN is stopped.
-//! 6. [`line`]: image work only; each sample finds the line it sees.
+//! 6. [`mod@line`]: image work only; each sample finds the line it sees.
 //! 7. [`film`]: samples are filtered into layers and written as tiles finish.
 //!
 //! [`render`] is the loop over all of it. Nothing but [`cli`] prints; problems are [`diag::Diagnostic`]s.

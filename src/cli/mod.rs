@@ -1,4 +1,4 @@
-//! The command line: one file per command; arguments as typed in [`args`], as meant in [`request`].
+//! The command line: one file per command; arguments as typed in `args`, as meant in `request`.
 //!
 //! This is the only place that prints. Talk goes to standard error, data to standard output.
 

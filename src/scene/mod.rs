@@ -1,6 +1,6 @@
 //! The scene: what a picture shows, resolved and immutable.
 //!
-//! Two doors lead in: a scene file ([`file`]) and a model ([`gltf`]); both fill a [`SceneBuilder`], as code that makes
+//! Two doors lead in: a scene file ([`mod@file`]) and a model ([`gltf`]); both fill a [`SceneBuilder`], as code that makes
 //! a scene by hand does. [`SceneBuilder::build`] checks what must hold between the parts, and from then on every id is
 //! in range, every number finite, and no default is left to choose.
 

@@ -127,7 +127,7 @@ impl Surface {
             .unwrap_or_else(|| crate::math::frame(self.normal).0);
         // The cross product of normal and tangent turns round with the normal, which was turned towards the ray, and in
         // a mirrored object; the bitangent must not.
-        let turned = !self.front != (object.world_from_object.determinant() < 0.0);
+        let turned = self.front == (object.world_from_object.determinant() < 0.0);
         tangent.extend(if turned { -handedness } else { handedness })
     }
 
