@@ -6,9 +6,9 @@ use proptest::prelude::*;
 use serde_json::{Value, json};
 use tusche::files::FileStore;
 use tusche::scene::SceneBuilder;
-use tusche::scene::gltf::{ModelTime, Placement, import, load_model};
+use tusche::scene::gltf::{ModelTime, Placement, import};
 
-use super::{FLOAT, Model, UNSIGNED_BYTE, UNSIGNED_SHORT, glb};
+use super::{FLOAT, Model, UNSIGNED_BYTE, UNSIGNED_SHORT, glb, load_model};
 
 /// What importing raw bytes says.
 fn told(name: &str, bytes: impl Into<Vec<u8>>) -> String {

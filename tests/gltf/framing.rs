@@ -10,10 +10,10 @@ use tusche::math::{DMat3, DVec2, DVec3, Vec3};
 use tusche::scene::SceneBuilder;
 use tusche::scene::camera::{Camera, Projection};
 use tusche::scene::framing::{FILL, bounds, default_lights, frame_camera};
-use tusche::scene::gltf::{ModelTime, load_model};
+use tusche::scene::gltf::ModelTime;
 use tusche::scene::light::LightKind;
 
-use super::Model;
+use super::{Model, load_model};
 
 fn load(model: &Model, camera: Option<&str>) -> (SceneBuilder, Diagnostics) {
     load_model(Path::new("model.gltf"), &model.store(), ModelTime::Rest, camera, [300, 200])

@@ -15,6 +15,7 @@ use serde_json::{Value, json};
 use tusche::diag::Diagnostics;
 use tusche::files::FileStore;
 use tusche::math::Vec3;
+use tusche::scene::framing as scene_framing;
 use tusche::scene::gltf::{Imported, ModelTime, Placement, import};
 use tusche::scene::mesh::Mesh;
 use tusche::scene::{Object, SceneBuilder};
@@ -208,4 +209,25 @@ fn assert_near(found: &[Vec3], expected: &[[f32; 3]]) {
     for (a, b) in found.iter().zip(expected) {
         assert!(a.distance(Vec3::from(*b)) < 1e-5, "found {found:?}, expected {expected:?}");
     }
+}
+
+/// A model alone as a scene: framed, with its own lights or the default ones.
+fn load_model(
+    path: &Path,
+    files: &FileStore,
+    time: ModelTime,
+    camera: Option<&str>,
+    size: [u32; 2],
+) -> Result<(SceneBuilder, Diagnostics), Diagnostics> {
+    let mut scene = SceneBuilder::default();
+    let imported = import(path, files, time, &mut scene, &Placement::named("model"))?;
+    scene.render.size = size;
+    let bounds = scene_framing::bounds(&scene);
+    scene.cameras.push(scene_framing::frame_camera(bounds, size));
+    scene.cameras.extend(imported.cameras);
+    scene.camera_name = camera.map(str::to_owned);
+    let seen_by = scene.cameras.iter().find(|known| camera == Some(known.name.as_str())).unwrap_or(&scene.cameras[0]);
+    scene.lights =
+        if imported.lights.is_empty() { scene_framing::default_lights(seen_by, bounds) } else { imported.lights };
+    Ok((scene, imported.warnings))
 }

@@ -8,7 +8,9 @@ use tusche::math::DVec3;
 use tusche::scene::SceneBuilder;
 use tusche::scene::camera::{Camera, Projection};
 use tusche::scene::framing;
-use tusche::scene::gltf::{ModelTime, load_model};
+use tusche::scene::gltf::ModelTime;
+
+use super::load_model;
 
 /// The path of a model, or `None` (told) where the models are absent. `TUSCHE_MODELS` names another folder of models.
 fn shared(name: &str) -> Option<PathBuf> {

@@ -83,6 +83,12 @@ pub fn load(
         let file = span.and_then(|span| sources.iter().position(|source| Arc::ptr_eq(source, &span.source)));
         (file.unwrap_or(sources.len()), span.map_or(0, |span| span.range.start))
     });
+    if extension.as_deref() != Some("toml") {
+        // Nobody wrote the text that stands for a bare model; its messages name the model.
+        for fault in faults.0.iter_mut().filter(|fault| fault.span.as_ref().is_some_and(|span| span.source == source)) {
+            fault.span = None;
+        }
+    }
     if faults.has_errors() { Err(faults) } else { Ok((builder, faults)) }
 }
 

@@ -38,23 +38,16 @@ use std::path::Path;
 
 use super::SceneBuilder;
 use super::camera::Camera;
-use super::framing;
 use super::ids::MaterialId;
 use super::light::Light;
-use super::settings::{Background, RayKinds};
+use super::settings::RayKinds;
 use crate::diag::{Diagnostics, Span};
 use crate::files::FileStore;
-use crate::math::{DAffine3, Vec3};
+use crate::math::DAffine3;
 use report::Report;
 
 /// Frames in a second of animation, for [`ModelTime::Frame`].
 pub const FRAMES_PER_SECOND: f64 = 24.0;
-
-/// What rays that leave the scene of a bare model see, linear.
-pub const MODEL_BACKGROUND: Vec3 = Vec3::splat(0.9);
-
-/// Lines of a bare model where normals differ by more than this many degrees, beside those around objects and materials.
-pub const MODEL_CREASE_DEGREES: Option<f32> = None;
 
 /// At which time a model's animation is taken.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -149,34 +142,4 @@ pub fn import(
         Some(model) if !report.has_errors() => Ok(model.commit(into, placement, report.finish())),
         _ => Err(report.finish()),
     }
-}
-
-/// Makes a whole scene of a bare model: a camera that frames it, its own lights or default ones, a light background.
-///
-/// The model's own cameras come after the framing one; `camera` chooses one by name. `size` is the picture's size in
-/// pixels, which framing depends on. Beside the scene come warnings.
-///
-/// # Errors
-/// As [`import`]. A camera that does not exist is told by [`SceneBuilder::build`].
-pub fn load_model(
-    path: &Path,
-    files: &FileStore,
-    time: ModelTime,
-    camera: Option<&str>,
-    size: [u32; 2],
-) -> Result<(SceneBuilder, Diagnostics), Diagnostics> {
-    let mut scene = SceneBuilder::default();
-    let name = path.file_stem().map_or_else(|| "model".into(), |stem| stem.to_string_lossy().into_owned());
-    let imported = import(path, files, time, &mut scene, &Placement::named(name))?;
-    scene.render.size = size;
-    scene.render.background = Background::Color(MODEL_BACKGROUND);
-    scene.lines.normal = MODEL_CREASE_DEGREES;
-    scene.time = time.seconds() as f32;
-    let bounds = framing::bounds(&scene);
-    scene.cameras.push(framing::frame_camera(bounds, size));
-    scene.cameras.extend(imported.cameras);
-    scene.camera_name = camera.map(str::to_owned);
-    let seen_by = scene.cameras.iter().find(|known| camera == Some(known.name.as_str())).unwrap_or(&scene.cameras[0]);
-    scene.lights = if imported.lights.is_empty() { framing::default_lights(seen_by, bounds) } else { imported.lights };
-    Ok((scene, imported.warnings))
 }
