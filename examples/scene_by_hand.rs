@@ -34,7 +34,7 @@ fn main() -> Result<(), Diagnostics> {
     scene.lines.normal = Some(20.0);
 
     let projection = Projection::Perspective { fov_y: 30.0_f64.to_radians() };
-    scene.cameras.push(Camera::look_at("camera", projection, DVec3::new(2.0, 1.5, 5.0), DVec3::ZERO, DVec3::Y)?);
+    scene.cameras.push(Camera::look_at("camera", projection, DVec3::new(2.8, 2.1, 7.0), DVec3::ZERO, DVec3::Y)?);
     scene.lights.push(Light {
         name: "sun".into(),
         kind: LightKind::Sun { direction: Vec3::new(1.0, 2.0, 1.0).normalize(), irradiance: Vec3::splat(3.0) },
