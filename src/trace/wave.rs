@@ -14,7 +14,7 @@ use super::triangle::Ray;
 use super::world::World;
 use crate::clock::CpuClock;
 use crate::math::Vec3;
-use crate::plan::Plan;
+use crate::plan::{Plan, marker};
 use crate::sample::position::SamplePositions;
 use crate::sample::{PixelRect, SampleBuffer, SampleBufferBuilder, SampleColor};
 use crate::scene::Scene;
@@ -128,11 +128,7 @@ impl<'a> TileTracer<'a> {
             positions: SamplePositions::new(settings.samples, settings.seed),
             transparent: settings.background == Background::Transparent,
             cone: (width, angle),
-            marker: {
-                let color = if plan.color { OutputSet::COLOR } else { OutputSet::empty() };
-                let width = if plan.lines.is_some() { OutputSet::LINE_WIDTH } else { OutputSet::empty() };
-                color | width
-            },
+            marker: marker(plan.color, plan.lines.is_some()),
         }
     }
 

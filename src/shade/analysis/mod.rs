@@ -35,6 +35,7 @@ use std::sync::Arc;
 
 use self::value::{Abstract, Field, Record, Shape};
 use self::walk::{Flow, Walker};
+pub(in crate::shade) use self::walk::{Functions, ScriptFunction, functions};
 use super::names::{AOV_PREFIX, InputSet, OutputSet};
 use super::params::{Params, Value};
 use crate::diag;

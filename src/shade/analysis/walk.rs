@@ -78,7 +78,7 @@ pub(super) struct Call {
 }
 
 /// A function that the script defines.
-pub(super) struct ScriptFunction {
+pub(in crate::shade) struct ScriptFunction {
     pub parameters: Vec<String>,
     pub body: Vec<Stmt>,
     /// Whether it is for one type of `this` only.
@@ -86,10 +86,10 @@ pub(super) struct ScriptFunction {
 }
 
 /// Functions of a script by name and number of parameters.
-pub(super) type Functions = BTreeMap<(String, usize), ScriptFunction>;
+pub(in crate::shade) type Functions = BTreeMap<(String, usize), ScriptFunction>;
 
 /// The functions of a script.
-pub(super) fn functions(ast: &AST) -> Functions {
+pub(in crate::shade) fn functions(ast: &AST) -> Functions {
     let mut functions = Functions::new();
     for function in ast.iter_functions() {
         let count = function.params.len();

@@ -51,9 +51,7 @@ impl Hit {
 
     fn irradiance(&self) -> Outcome<Vec3> {
         let normal = self.read("normal", &self.batch.normal)?;
-        Ok(self.lights()?.iter().fold(Vec3::ZERO, |sum, light| {
-            sum + light.radiance * light.visibility * max(0.0, dot(normal, light.direction))
-        }))
+        Ok(irradiance(normal, self.lights()?))
     }
 
     /// The texture coordinates of a set; (0, 0) where the mesh lacks the set.
@@ -66,6 +64,14 @@ impl Hit {
             },
         }
     }
+}
+
+/// What all lights together give a surface with this normal.
+#[inline(always)]
+pub(in crate::shade) fn irradiance(normal: Vec3, lights: &[LightSample]) -> Vec3 {
+    lights.iter().fold(Vec3::ZERO, |sum, light| {
+        sum + light.radiance * light.visibility * max(0.0, dot(normal, light.direction))
+    })
 }
 
 /// A hit was asked for what its batch does not hold: the analysis missed that the script reads it.

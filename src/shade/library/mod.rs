@@ -6,12 +6,12 @@
 //!
 //! Wherever a number is expected, a script may write `1` or `1.0`; an int counts as the nearest float.
 
-mod color;
+pub(in crate::shade) mod color;
 mod compare;
-mod hash;
-mod hit;
-mod math;
-mod noise;
+pub(in crate::shade) mod hash;
+pub(in crate::shade) mod hit;
+pub(in crate::shade) mod math;
+pub(in crate::shade) mod noise;
 mod operand;
 mod parameters;
 mod ramp;
