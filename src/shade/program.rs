@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use rhai::Engine;
 
-use super::analysis::{self, Analysis};
+use super::analysis::{self, Analysis, Finding};
 use super::host::Host;
 use super::library::ParameterRecord;
 use super::names::InputSet;
@@ -74,6 +74,12 @@ impl Shader {
     #[must_use]
     pub fn mode(&self) -> Mode {
         if self.analysis.is_constant() { Mode::Constant } else { Mode::Interpreted }
+    }
+
+    /// Of an interpreted shader: the construct because of which it is no kernel, where one is to blame.
+    #[must_use]
+    pub fn blame(&self) -> Option<&Finding> {
+        self.analysis.blame.as_ref()
     }
 
     /// The columns of a [`HitBatch`](super::HitBatch) that must be filled for it.

@@ -6,6 +6,7 @@ use rhai::{AST, ASTNode, Caches, Dynamic, Engine, EvalAltResult, Expr, Immutable
 
 use super::analysis::Finding;
 use super::fault::{Fault, from_parse_error, from_run, span};
+use super::host::MAX_SCRIPT;
 use super::names::AOV_PREFIX;
 use crate::diag::{Diagnostic, Diagnostics, Source, Span};
 
@@ -38,6 +39,11 @@ impl std::fmt::Debug for Function {
 impl Program {
     /// Parses a script and checks its functions.
     pub fn parse(engine: &Engine, source: &Arc<Source>) -> Result<Self, Diagnostics> {
+        let size = source.text.len();
+        if size > MAX_SCRIPT {
+            let fault = Diagnostic::error(format!("a script may have at most {MAX_SCRIPT} bytes, and this has {size}"));
+            return Err(fault.in_file(&source.name).into());
+        }
         let ast = engine.compile(source.text.as_str()).map_err(|error| from_parse_error(&error, source))?;
         let mut faults = Diagnostics::default();
         if let Some(statement) = ast.statements().first() {
@@ -144,6 +150,15 @@ impl Program {
         match &finding.hint {
             Some(hint) => fault.hint(hint.clone()),
             None => fault,
+        }
+    }
+
+    /// Where the name of a function with this many parameters stands.
+    pub fn function_span(&self, name: &str, parameters: usize) -> Span {
+        let mut functions = self.ast.iter_fn_def();
+        match functions.find(|function| function.name == name && function.params.len() == parameters) {
+            Some(function) => name_span(&self.source, function.body.start_position(), name),
+            None => Span::new(&self.source, 0..0),
         }
     }
 

@@ -27,8 +27,9 @@ mod soundness;
 mod statements;
 mod switch;
 mod value;
-mod walk;
+pub(in crate::shade) mod walk;
 
+use std::collections::BTreeSet;
 use std::fmt;
 use std::rc::Rc;
 use std::sync::Arc;
@@ -75,6 +76,8 @@ pub struct Analysis {
     pub outputs: Vec<OutputFact>,
     /// Extra outputs, by name without `aov_`, sorted.
     pub aovs: Vec<(String, OutputFact)>,
+    /// Parameters that code which may run reads.
+    pub parameters: BTreeSet<String>,
     /// Whether the facts are known to be complete. If not, all inputs are assumed read and all outputs written.
     pub complete: bool,
     /// If not complete: the construct that stopped the analysis.
@@ -96,6 +99,7 @@ pub fn analyse(ast: &rhai::AST, params: &Params, textures: &[Arc<Texture>]) -> A
                 analysis.add(key, field, &mut walker);
             }
             analysis.aovs.sort_by(|a, b| a.0.cmp(&b.0));
+            analysis.parameters = walker.parameters.iter().map(|name| (**name).to_owned()).collect();
             analysis.findings = walker.findings.into_iter().collect();
             analysis
         }

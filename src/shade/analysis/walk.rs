@@ -78,7 +78,7 @@ pub(super) struct Call {
 }
 
 /// A function that the script defines.
-pub(super) struct ScriptFunction {
+pub(in crate::shade) struct ScriptFunction {
     pub parameters: Vec<String>,
     pub body: Vec<Stmt>,
     /// Whether it is for one type of `this` only.
@@ -86,10 +86,10 @@ pub(super) struct ScriptFunction {
 }
 
 /// Functions of a script by name and number of parameters.
-pub(super) type Functions = BTreeMap<(String, usize), ScriptFunction>;
+pub(in crate::shade) type Functions = BTreeMap<(String, usize), ScriptFunction>;
 
 /// The functions of a script.
-pub(super) fn functions(ast: &AST) -> Functions {
+pub(in crate::shade) fn functions(ast: &AST) -> Functions {
     let mut functions = Functions::new();
     for function in ast.iter_functions() {
         let count = function.params.len();
@@ -121,6 +121,8 @@ pub(super) struct Walker<'a> {
     pub calls: Vec<Call>,
     /// Inputs that were read.
     pub inputs: InputSet,
+    /// Parameters that were read.
+    pub parameters: BTreeSet<Rc<str>>,
     /// By place, so that code that is walked twice is blamed once.
     pub findings: BTreeSet<Finding>,
     /// Why the walk gave up.
@@ -142,6 +144,7 @@ impl<'a> Walker<'a> {
             texture_bounds: BTreeMap::new(),
             calls: vec![Call::default()],
             inputs: InputSet::empty(),
+            parameters: BTreeSet::new(),
             findings: BTreeSet::new(),
             blame: None,
             next_identity: 0,
@@ -185,6 +188,11 @@ impl<'a> Walker<'a> {
     pub fn escape(&mut self, value: &Abstract) -> InputSet {
         if value.holds_hit() {
             self.inputs = InputSet::all();
+        }
+        if let Shape::Record(record) = &value.shape
+            && record.is_params
+        {
+            self.parameters.extend(record.fields.keys().cloned());
         }
         value.all_inputs()
     }
