@@ -23,7 +23,7 @@ fn one_broken_file_keeps_no_other_from_being_checked() {
 #[test]
 fn the_document_for_editors_is_as_recorded() {
     let place = Workplace::new();
-    place.file("a.rhai", "fn params() { #{ ink_width: 2.0, paint: rgb(0.1, 0.2, 0.3), map: () } }\nfn surface(hit, p) {\n    let é = 1; #{ line_width: p.ink_width * hit.depth, base_color: p.paint, aov_up: hit.normal }\n}\n");
+    place.file("a.rhai", "fn params() { #{ ink_width: 2.0, paint: rgb(0.1, 0.2, 0.3), map: () } }\nfn surface(hit, p) {\n    /* é */ let n = 1; #{ line_width: p.ink_width * hit.depth, base_color: p.paint, aov_up: hit.normal }\n}\n");
     place.file("b.rhai", BROKEN);
     let run = place.run(&["shader", "check", "--json", "a.rhai", "b.rhai", "gone.rhai"]).exits(1);
     assert_eq!(run.stderr(), "");
@@ -76,6 +76,24 @@ fn files_of_ten_megabytes_are_refused_at_once() {
     let run = place.run(&["shader", "check", "long.rhai", "wide.rhai"]).exits(1);
     golden(&root().join("tests/golden/shader_check/commands/ten_megabytes.txt"), &printed(&run));
     assert!(clock.elapsed().as_secs() < 30);
+}
+
+#[test]
+fn large_scripts_are_checked_in_no_time() {
+    let place = Workplace::new();
+    let functions = |count: usize| (0..count).map(|n| format!("fn f{n}(x) {{ x + {n}.0 }}\n")).collect::<String>();
+    let surface = "fn surface(hit, p) { #{ line_width: 1.0 } }\n";
+    place.file("many.rhai", functions(20_000) + surface);
+    place.file("most.rhai", functions(511) + surface);
+    place.file(
+        "long.rhai",
+        format!("fn surface(hit, p) {{ let x = 0.0;\n{}#{{ line_width: x }} }}", "x += 1.0;\n".repeat(90_000)),
+    );
+    let clock = std::time::Instant::now();
+    place.run(&["shader", "check", "many.rhai"]).exits(1).says("at most 512 functions, and this has 20001");
+    place.run(&["shader", "check", "most.rhai"]).exits(0).says("the function `f0` is never called");
+    place.run(&["shader", "check", "long.rhai"]);
+    assert!(clock.elapsed().as_secs() < 60, "{:?}", clock.elapsed());
 }
 
 #[test]

@@ -4,6 +4,8 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 
+use crate::cli::args::Size;
+
 #[derive(Debug, Subcommand)]
 pub enum ShaderCommand {
     /// Says what is wrong with shaders, what they read and write, and how they run.
@@ -12,6 +14,8 @@ pub enum ShaderCommand {
     Bench(BenchArguments),
     /// Writes a commented shader to start from.
     New(NewArguments),
+    /// Renders shaders on a ball and a knot.
+    Preview(PreviewArguments),
 }
 
 /// Which shaders, with which parameters.
@@ -52,6 +56,26 @@ pub struct BenchArguments {
     /// Prints the figures as JSON.
     #[arg(long)]
     pub json: bool,
+}
+
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  tusche shader preview cel.rhai -o ball.png --set ink_width=4")]
+pub struct PreviewArguments {
+    #[command(flatten)]
+    pub shaders: ShaderArguments,
+    /// Where to write the picture, .png or .exr, of a single shader [default: the shader's name with .png, in the
+    /// current folder].
+    #[arg(short, long, value_name = "FILE")]
+    pub output: Option<PathBuf>,
+    /// Size of the picture in pixels [default: 640x400].
+    #[arg(long, value_name = "WxH")]
+    pub size: Option<Size>,
+    /// Samples per pixel [default: 16].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4096))]
+    pub samples: Option<u32>,
+    /// Says nothing but errors.
+    #[arg(short, long)]
+    pub quiet: bool,
 }
 
 #[derive(Debug, Args)]

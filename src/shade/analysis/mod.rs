@@ -186,7 +186,13 @@ impl Analysis {
             None => {
                 let names = OutputSet::named().map(|(name, _)| name);
                 let message = format!("there is no output `{key}`");
-                let hint = nearest_hint(key, names);
+                let hint = nearest_hint(key, names).or_else(|| {
+                    let all: Vec<_> = OutputSet::named().map(|(name, _)| name).collect();
+                    Some(format!(
+                        "there are: {}; a layer of your own is called `{AOV_PREFIX}` and a name",
+                        all.join(", ")
+                    ))
+                });
                 walker.findings.insert(Finding { place: field.place, message, hint });
             }
         }

@@ -9,12 +9,13 @@ use crate::shade::names::{AOV_PREFIX, OutputSet};
 use crate::shade::params::MAX_LINE_WIDTH;
 use crate::shade::program::Shader;
 
+/// A width in pixels up to which a bound tells something: bounds from inputs without limits lie far above.
+const USEFUL_BOUND: f32 = 1024.0;
+
+/// Warnings about a shader whose trial had no errors.
 pub(super) fn warnings(shader: &Shader, material: &Material, trial: &Trial, cost: Option<f64>) -> Diagnostics {
     let mut warnings = Diagnostics::default();
-    // A shader that fails has given no values to judge by.
-    if trial.errors.is_empty() {
-        nan(shader, trial, &mut warnings);
-    }
+    nan(shader, trial, &mut warnings);
     line_width(shader, trial, &mut warnings);
     without_effect(shader, material, &mut warnings);
     if let Some(blame) = shader.blame() {
@@ -102,7 +103,7 @@ fn line_width(shader: &Shader, trial: &Trial, warnings: &mut Diagnostics) {
         return;
     }
     let Some(declared) = declared else {
-        if !high.is_some_and(f32::is_finite) && complete {
+        if !high.is_some_and(|high| high <= USEFUL_BOUND) && complete {
             warn(
                 "no upper bound of `line_width` is known, so tiles are rendered with room for the widest line of all"
                     .into(),
@@ -112,7 +113,7 @@ fn line_width(shader: &Shader, trial: &Trial, warnings: &mut Diagnostics) {
         }
         return;
     };
-    let widest = if trial.errors.is_empty() { widest(&trial.outputs) } else { None };
+    let widest = widest(&trial.outputs);
     // What the analysis knows for certain, or else what a trial has shown.
     let proved = fact.range.map(|range| range[0]).filter(|low| *low > declared);
     if let Some(width) = proved.or_else(|| widest.filter(|widest| *widest > declared)) {

@@ -39,6 +39,11 @@ pub(super) fn lint(shader: &Shader) -> Diagnostics {
     }
     let Lint { keys, mut warnings, .. } = lint;
 
+    if functions.get(&("surface".to_owned(), 2)).is_some_and(|surface| surface.parameters == [PARAMETERS, HIT]) {
+        let message = format!("`surface` gets the hit first: here it is called `{PARAMETERS}`");
+        let warning = Diagnostic::warning(message).at(program.surface.span.clone());
+        warnings.push(warning.hint(format!("write: fn surface({HIT}, {PARAMETERS})")));
+    }
     // Functions that neither `surface` nor `params` gets to.
     let mut reached = BTreeSet::new();
     let mut next = vec!["surface".to_owned(), "params".to_owned()];
@@ -114,11 +119,6 @@ impl Lint<'_> {
             Some(first) if is_surface => first.clone(),
             _ => HIT.to_owned(),
         };
-        if is_surface && function.parameters == [PARAMETERS, HIT] {
-            let place = function.body.first().map_or(Position::NONE, Stmt::position);
-            let message = format!("`surface` gets the hit first: here it is called `{PARAMETERS}`");
-            self.warn(place, message, Some(format!("write: fn surface({HIT}, {PARAMETERS})")));
-        }
         let argument = |(index, name): (usize, &String)| Variable {
             name: name.clone(),
             place: Position::NONE,

@@ -20,6 +20,7 @@ pub use report::Report;
 pub(crate) use report::input_names;
 
 use super::batch::OutputBatch;
+use super::fault::OUT_OF_OPERATIONS;
 use super::interpret::{ShadeErrors, Shading};
 use super::measure;
 use super::names::OutputSet;
@@ -67,7 +68,12 @@ pub fn check_script(source: &Arc<Source>, host: &Host) -> Check {
 pub fn check(scene: &Scene, material: MaterialId, host: &Host) -> Check {
     let (shaders, warnings) = match Shaders::compile(scene, host) {
         Ok(compiled) => compiled,
-        Err(faults) => return Check::failed(in_order(faults)),
+        Err(mut faults) => {
+            // Which material it is helps nobody who checks a shader.
+            let about = format!("the material is `{}`", scene.materials()[material.index()].name);
+            faults.0.iter_mut().for_each(|fault| fault.hints.retain(|hint| *hint != about));
+            return Check::failed(in_order(faults));
+        }
     };
     let shader = shaders.of(material);
     let trial = Trial::run(scene, &shaders, material);
@@ -78,7 +84,10 @@ pub fn check(scene: &Scene, material: MaterialId, host: &Host) -> Check {
     let mut diagnostics = warnings;
     diagnostics.extend(trial.errors.clone());
     diagnostics.extend(lint::lint(shader));
-    diagnostics.extend(facts::warnings(shader, &scene.materials()[material.index()], &trial, cost));
+    // A shader that fails has given no values to judge by, and has other worries.
+    if trial.errors.is_empty() {
+        diagnostics.extend(facts::warnings(shader, &scene.materials()[material.index()], &trial, cost));
+    }
     Check { diagnostics: in_order(diagnostics), report: Some(Report::new(shader, cost)) }
 }
 
@@ -114,7 +123,10 @@ impl Trial {
         let hits = synthetic::hits(TRIAL_HITS, 0);
         Shading::new(scene, shaders).shade(material, &hits, OutputSet::all(), &mut outputs, &mut errors);
         let errors = errors.errors.into_values().map(|(fault, count)| match count {
-            n if n < TRIAL_HITS as u64 => fault.hint(format!("this happened at {n} of {TRIAL_HITS} trial hits")),
+            // A shader that ran out of operations is not run again, so the count says nothing.
+            n if n < TRIAL_HITS as u64 && !fault.message.starts_with(OUT_OF_OPERATIONS) => {
+                fault.hint(format!("this happened at {n} of {TRIAL_HITS} trial hits"))
+            }
             _ => fault,
         });
         Self { errors: Diagnostics(errors.collect()), outputs, aovs: shaders.aovs().to_vec() }

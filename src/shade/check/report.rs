@@ -107,9 +107,7 @@ fn describe(fact: &OutputFact, unit: &str) -> String {
     if let Some(constant) = &fact.constant {
         parts.push(format!("constant {}{unit}", value(constant)));
     } else {
-        if let Some([low, high]) = fact.range {
-            parts.push(format!("{} … {}{unit}", number(low), number(high)));
-        }
+        parts.extend(fact.range.and_then(|range| bounds(range, unit)));
         if fact.inputs.is_empty() {
             parts.push("constant".into());
         }
@@ -119,6 +117,20 @@ fn describe(fact: &OutputFact, unit: &str) -> String {
     }
     parts.join(", ")
 }
+
+/// `0.2 … 0.6`, `at least 0`, …; nothing if there is no bound that tells something.
+fn bounds([low, high]: [f32; 2], unit: &str) -> Option<String> {
+    match (low > -UNTOLD, high < UNTOLD) {
+        (true, true) if low == high => Some(format!("{}{unit}", number(low))),
+        (true, true) => Some(format!("{} … {}{unit}", number(low), number(high))),
+        (true, false) => Some(format!("at least {}{unit}", number(low))),
+        (false, true) => Some(format!("at most {}{unit}", number(high))),
+        (false, false) => None,
+    }
+}
+
+/// Bounds of this size come from what positions and radiance are limited to at all, and are not told.
+const UNTOLD: f32 = 1e15;
 
 fn value(value: &Value) -> String {
     let list = |channels: &[f32]| format!("({})", channels.iter().map(|x| number(*x)).collect::<Vec<_>>().join(", "));
