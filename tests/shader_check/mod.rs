@@ -1,7 +1,9 @@
 //! `tusche shader …`: what is said of shaders, what they cost, how they begin, and how they look.
 
 mod commands;
+mod declared_width;
 mod goldens;
+mod preview;
 
 use crate::common::{Run, Workplace};
 
