@@ -62,8 +62,7 @@ impl Program {
         let surface = Self::find(&ast, source, "surface", 2, "surface(hit, p)", &mut faults);
         if surface.is_none() && !faults.has_errors() {
             let fault = Fault::new("this shader has no function `surface`");
-            let names = ast.iter_functions().map(|function| function.name).collect::<Vec<_>>();
-            let fault = match nearest("surface", names.into_iter()) {
+            let fault = match nearest("surface", ast.iter_functions().map(|function| function.name)) {
                 Some(near) => fault.hint(format!("is `{near}` meant to be it?")),
                 None => fault,
             };
