@@ -6,8 +6,9 @@ use rhai::{AST, ASTNode, Caches, Dynamic, Engine, EvalAltResult, Expr, Immutable
 
 use super::analysis::Finding;
 use super::fault::{Fault, from_parse_error, from_run, span};
+use super::host::{MAX_FUNCTIONS, MAX_SCRIPT};
 use super::names::AOV_PREFIX;
-use crate::diag::{Diagnostic, Diagnostics, Source, Span};
+use crate::diag::{Diagnostic, Diagnostics, Source, Span, nearest};
 
 /// A parsed script that has a `surface`.
 #[derive(Debug)]
@@ -38,7 +39,18 @@ impl std::fmt::Debug for Function {
 impl Program {
     /// Parses a script and checks its functions.
     pub fn parse(engine: &Engine, source: &Arc<Source>) -> Result<Self, Diagnostics> {
+        let size = source.text.len();
+        if size > MAX_SCRIPT {
+            let fault = Diagnostic::error(format!("a script may have at most {MAX_SCRIPT} bytes, and this has {size}"));
+            return Err(fault.in_file(&source.name).into());
+        }
         let ast = engine.compile(source.text.as_str()).map_err(|error| from_parse_error(&error, source))?;
+        let count = ast.iter_fn_def().count();
+        if count > MAX_FUNCTIONS {
+            let fault =
+                Fault::new(format!("a script may have at most {MAX_FUNCTIONS} functions, and this has {count}"));
+            return Err(fault.at(Span::new(source, 0..0)).into());
+        }
         let mut faults = Diagnostics::default();
         if let Some(statement) = ast.statements().first() {
             faults.push(
@@ -49,11 +61,13 @@ impl Program {
         }
         let surface = Self::find(&ast, source, "surface", 2, "surface(hit, p)", &mut faults);
         if surface.is_none() && !faults.has_errors() {
-            faults.push(
-                Fault::new("this shader has no function `surface`")
-                    .hint("write: fn surface(hit, p) { #{ base_color: rgb(0.8, 0.2, 0.1) } }")
-                    .at(Span::new(source, 0..0)),
-            );
+            let fault = Fault::new("this shader has no function `surface`");
+            let fault = match nearest("surface", ast.iter_functions().map(|function| function.name)) {
+                Some(near) => fault.hint(format!("is `{near}` meant to be it?")),
+                None => fault,
+            };
+            let hint = "write: fn surface(hit, p) { #{ base_color: rgb(0.8, 0.2, 0.1) } }";
+            faults.push(fault.hint(hint).at(Span::new(source, 0..0)));
         }
         let params = Self::find(&ast, source, "params", 0, "params()", &mut faults);
         match surface {
@@ -130,7 +144,7 @@ impl Program {
 
     /// An error of a run, with its place.
     pub fn explain(&self, error: &EvalAltResult) -> Diagnostic {
-        from_run(error, &self.source, &self.functions)
+        from_run(error, &self.surface.span, &self.functions)
     }
 
     /// What the analysis found, at its place.
@@ -144,6 +158,15 @@ impl Program {
         match &finding.hint {
             Some(hint) => fault.hint(hint.clone()),
             None => fault,
+        }
+    }
+
+    /// Where the name of a function with this many parameters stands.
+    pub fn function_span(&self, name: &str, parameters: usize) -> Span {
+        let mut functions = self.ast.iter_fn_def();
+        match functions.find(|function| function.name == name && function.params.len() == parameters) {
+            Some(function) => name_span(&self.source, function.body.start_position(), name),
+            None => Span::new(&self.source, 0..0),
         }
     }
 
