@@ -6,6 +6,7 @@
 //!
 //! Wherever a number is expected, a script may write `1` or `1.0`; an int counts as the nearest float.
 
+pub mod batch;
 mod color;
 mod compare;
 mod hash;
