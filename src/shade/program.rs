@@ -97,11 +97,11 @@ impl Shaders {
     /// Compiles and analyses all scripts of a scene. Warnings come beside the value.
     ///
     /// # Errors
-    /// Every syntax error, missing `surface`, fault in `params()`, unknown or ill-typed parameter, and what the analysis
+    /// What the host could not register; every syntax error, missing `surface`, fault in `params()`, unknown or ill-typed parameter, and what the analysis
     /// finds to be certainly wrong (unknown inputs, outputs and parameters in code that may run), at its place.
     pub fn compile(scene: &Scene, host: &Host) -> Result<(Self, Diagnostics), Diagnostics> {
         let engine = host.engine(&BTreeSet::new());
-        let mut faults = Diagnostics::default();
+        let mut faults = host.check().err().unwrap_or_default();
         let mut keep = |result: Result<_, Diagnostics>| result.map_err(|found| faults.extend(found)).ok();
 
         let scripts: Vec<_> = scene
