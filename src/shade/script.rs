@@ -8,6 +8,7 @@ use super::analysis::Finding;
 use super::fault::{Fault, from_parse_error, from_run, span};
 use super::host::{MAX_FUNCTIONS, MAX_SCRIPT};
 use super::names::AOV_PREFIX;
+use super::native;
 use crate::diag::{Diagnostic, Diagnostics, Source, Span, nearest};
 
 /// A parsed script that has a `surface`.
@@ -131,7 +132,8 @@ impl Program {
             scope.push_dynamic(name.clone(), value);
         }
         #[allow(deprecated, reason = "the one door to a cache of resolved functions that lasts longer than a call")]
-        engine.eval_statements_raw(&mut global, caches, &mut scope, &function.body)
+        let result = engine.eval_statements_raw(&mut global, caches, &mut scope, &function.body);
+        result.map_err(|error| native::clarify(engine, error))
     }
 
     /// What `params()` returns; an empty record without it.

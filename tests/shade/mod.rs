@@ -2,6 +2,7 @@
 
 mod errors;
 mod library;
+mod native;
 mod shading;
 mod shipped;
 

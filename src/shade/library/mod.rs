@@ -6,6 +6,7 @@
 //!
 //! Wherever a number is expected, a script may write `1` or `1.0`; an int counts as the nearest float.
 
+pub mod batch;
 pub(in crate::shade) mod color;
 mod compare;
 pub(in crate::shade) mod hash;
@@ -30,17 +31,17 @@ pub(super) use parameters::ParameterRecord;
 
 /// A function of the library, for messages and reference pages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Function {
+pub struct Function<'a> {
     /// Its name.
-    pub name: &'static str,
+    pub name: &'a str,
     /// How it is called.
-    pub form: &'static str,
+    pub form: &'a str,
     /// What it gives.
-    pub about: &'static str,
+    pub about: &'a str,
 }
 
 /// All functions of the library, by subject.
-pub fn functions() -> impl Iterator<Item = Function> + Clone {
+pub fn functions() -> impl Iterator<Item = Function<'static>> + Clone {
     [
         vectors::FUNCTIONS,
         math::FUNCTIONS,

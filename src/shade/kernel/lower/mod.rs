@@ -30,11 +30,11 @@ use rhai::{AST, Position};
 use self::meaning::{Channels, Field, Meaning, Record};
 use super::build::Builder;
 use super::ir::{Block, Code, Comparison, Item, Operand, ValueType};
-use crate::math::Affine2;
 use crate::scene::texture::{Texture, TextureRef};
 use crate::shade::analysis::{Finding, Functions, ScriptFunction, functions};
 use crate::shade::host::{MAX_CALL_DEPTH, MAX_OPERATIONS};
 use crate::shade::names::{AOV_PREFIX, OutputForm, OutputSet};
+use crate::shade::native::NativeFunction;
 use crate::shade::params::{Params, Value};
 
 /// Constructs that are walked before a script counts as too long to be a kernel.
@@ -93,6 +93,8 @@ pub(in crate::shade) struct Surroundings<'a> {
     pub textures: &'a [Arc<Texture>],
     /// Material number, from 1, as `hit.material_id`.
     pub material_id: u32,
+    /// Functions that plug-ins have added.
+    pub natives: &'a [NativeFunction],
     /// Lights in the scene; `None` if the same kernel must serve any number.
     pub light_count: Option<usize>,
 }
@@ -112,6 +114,7 @@ pub(super) struct Lowered {
     /// What the record that `surface` returns holds.
     pub outputs: Vec<LoweredOutput>,
     pub textures: Vec<TextureUse>,
+    pub natives: Vec<NativeFunction>,
     /// What loops may cost in the interpreter's operations before their hits are given to it.
     pub fuel: u64,
 }
@@ -143,6 +146,7 @@ pub(super) fn lower(ast: &AST, params: &Params, surroundings: Surroundings<'_>) 
         functions: &functions,
         surroundings,
         textures: Vec::new(),
+        natives: Vec::new(),
         cells: Vec::new(),
         live: Some(Operand::TRUE),
         frames: Vec::new(),
@@ -170,9 +174,9 @@ pub(super) fn lower(ast: &AST, params: &Params, surroundings: Surroundings<'_>) 
     if fuel == 0 {
         return Err(lowerer.blame(Position::NONE, "the sheer number of operations"));
     }
-    let textures = std::mem::take(&mut lowerer.textures);
+    let (textures, natives) = (std::mem::take(&mut lowerer.textures), std::mem::take(&mut lowerer.natives));
     let (block, types) = lowerer.builder.finish();
-    Ok(Lowered { block, types, outputs, textures, fuel })
+    Ok(Lowered { block, types, outputs, textures, natives, fuel })
 }
 
 /// The state of the walk.
@@ -181,6 +185,7 @@ struct Lowerer<'a> {
     functions: &'a Functions,
     surroundings: Surroundings<'a>,
     textures: Vec<TextureUse>,
+    natives: Vec<NativeFunction>,
     cells: Vec<Cell>,
     /// At which hits control is here; `None` if at none.
     live: Option<Operand>,
@@ -401,8 +406,7 @@ impl Lowerer<'_> {
             return self.give_up(position, "a call nested this deep");
         }
         let cells = self.cells.len();
-        let (returned, result) =
-            (self.new_cell(Meaning::bool(false), true), self.new_cell(Meaning::Undefined, true));
+        let (returned, result) = (self.new_cell(Meaning::bool(false), true), self.new_cell(Meaning::Undefined, true));
         let entry = self.live;
         self.frames.push(Frame { names, loops: Vec::new(), returned, result, function: name.into() });
         let value = self.statements(&function.body)?;
@@ -516,14 +520,7 @@ impl Lowerer<'_> {
     }
 
     /// An exit cell after a choice. At hits that were live on neither side it stays what it was.
-    fn join_exit(
-        &mut self,
-        uniform: bool,
-        guards: [Operand; 2],
-        a: &Meaning,
-        b: &Meaning,
-        index: usize,
-    ) -> Meaning {
+    fn join_exit(&mut self, uniform: bool, guards: [Operand; 2], a: &Meaning, b: &Meaning, index: usize) -> Meaning {
         if a == b {
             return a.clone();
         }
@@ -568,9 +565,4 @@ impl Lowerer<'_> {
         }
         Ok(value)
     }
-}
-
-/// A use of a texture without a transform, on the first uv set.
-pub(super) fn plain_place(texture: crate::scene::ids::TextureId) -> TextureRef {
-    TextureRef { texture, uv_set: 0, transform: Affine2::IDENTITY }
 }
