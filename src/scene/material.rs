@@ -18,6 +18,14 @@ pub struct Script {
     pub path: Option<PathBuf>,
 }
 
+/// Files that scripts name, found and read when the scene was loaded.
+#[derive(Clone, Debug, Default)]
+pub struct ScriptFiles {
+    /// Modules, by the name of the source that imports them and the path as written there. A file has one name,
+    /// whoever imports it.
+    pub modules: BTreeMap<(String, String), Arc<Source>>,
+}
+
 /// A parameter's value as written in a scene file or a model.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ParamValue {

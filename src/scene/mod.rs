@@ -12,6 +12,7 @@ pub mod ids;
 pub mod light;
 pub mod material;
 pub mod mesh;
+pub mod script_files;
 pub mod settings;
 pub mod shape;
 pub mod texture;
@@ -23,7 +24,7 @@ use crate::math::DAffine3;
 use camera::Camera;
 use ids::{MaterialId, MeshId, ObjectId, ScriptId, TextureId};
 use light::Light;
-use material::{Material, Script};
+use material::{Material, Script, ScriptFiles};
 use mesh::Mesh;
 use settings::{LineSettings, RayKinds, RenderSettings};
 use texture::Texture;
@@ -99,6 +100,12 @@ impl Scene {
         &self.parts.scripts
     }
 
+    /// The files that scripts name.
+    #[must_use]
+    pub fn script_files(&self) -> &ScriptFiles {
+        &self.parts.script_files
+    }
+
     /// All textures; `TextureId` is the index.
     #[must_use]
     pub fn textures(&self) -> &[Arc<Texture>] {
@@ -151,6 +158,8 @@ pub struct SceneBuilder {
     pub materials: Vec<Material>,
     /// All scripts.
     pub scripts: Vec<Script>,
+    /// The files that scripts name (see [`script_files::load`]).
+    pub script_files: ScriptFiles,
     /// All textures.
     pub textures: Vec<Arc<Texture>>,
     /// All lights.

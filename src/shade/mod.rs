@@ -12,15 +12,18 @@ pub mod analysis;
 pub mod batch;
 pub mod bsdf;
 pub mod builtin;
+mod closures;
 mod fault;
 pub mod host;
 pub mod interpret;
 pub mod library;
 pub mod lighting;
+mod link;
 pub mod names;
 mod output;
 pub mod params;
 pub mod program;
+pub mod requests;
 mod script;
 
 pub use analysis::Analysis;

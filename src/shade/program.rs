@@ -108,7 +108,7 @@ impl Shaders {
             .scripts()
             .iter()
             .map(|script| {
-                keep(Program::parse(&engine, &script.source).and_then(|program| {
+                keep(Program::parse(&script.source, scene.script_files()).and_then(|program| {
                     let defaults = params::defaults(&program, &program.defaults(&engine)?)?;
                     Ok((Arc::new(program), defaults))
                 }))
@@ -120,7 +120,7 @@ impl Shaders {
             let Some((program, defaults)) = &scripts[material.script.index()] else { continue };
             match params::resolve(defaults.clone(), material, program) {
                 Ok(params) => {
-                    let analysis = analysis::analyse(&program.ast, &params, scene.textures());
+                    let analysis = analysis::analyse_program(program, &params, scene.textures());
                     for finding in &analysis.findings {
                         let fault = program.found(finding);
                         // Materials that share a script share its faults.

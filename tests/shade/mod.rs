@@ -1,7 +1,9 @@
 //! The script host: what shaders may say, what they mean, and what is said when they are wrong.
 
+mod closures;
 mod errors;
 mod library;
+mod modules;
 mod shading;
 mod shipped;
 

@@ -6,7 +6,7 @@
 use std::rc::Rc;
 
 use super::interval::Interval;
-use super::value::{Abstract, Field, Record, Shape, Vector};
+use super::value::{Abstract, Field, NOWHERE, Record, Shape, Vector};
 use super::walk::Walker;
 use crate::scene::texture::TextureRef;
 use crate::shade::names::InputSet;
@@ -69,7 +69,7 @@ impl Walker<'_> {
         let mut record = Record::default();
         for (name, shape) in parts {
             let value = self.value(shape, inputs);
-            record.fields.insert(name.into(), Field::always(value, (0, 0)));
+            record.fields.insert(name.into(), Field::always(value, NOWHERE));
         }
         self.constant(Shape::Record(Rc::new(record)))
     }

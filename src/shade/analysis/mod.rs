@@ -16,6 +16,7 @@
 //! Functions that neither the library nor the script defines are taken to be pure. The walk is bounded in time.
 
 mod chains;
+mod closure;
 mod expressions;
 mod functions;
 mod geometry;
@@ -33,10 +34,12 @@ use std::fmt;
 use std::rc::Rc;
 use std::sync::Arc;
 
-use self::value::{Abstract, Field, Record, Shape};
+use self::value::{Abstract, Field, NOWHERE, Place, Record, Shape};
 use self::walk::{Flow, Walker};
 use super::names::{AOV_PREFIX, InputSet, OutputSet};
+use super::link;
 use super::params::{Params, Value};
+use super::script::{Functions, Program};
 use crate::diag;
 use crate::scene::texture::Texture;
 
@@ -58,6 +61,8 @@ pub struct OutputFact {
 /// Something in a script that is certainly wrong, or beyond analysis.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Finding {
+    /// Which file it is in: 0 is the script itself, 1 and up are its modules.
+    pub file: usize,
     /// Line and column, both from 1; 0 where the script engine does not know.
     pub place: (usize, usize),
     /// What is wrong, in one sentence without a full stop.
@@ -87,9 +92,23 @@ pub struct Analysis {
 /// the scene's table, which texture parameters point into.
 #[must_use]
 pub fn analyse(ast: &rhai::AST, params: &Params, textures: &[Arc<Texture>]) -> Analysis {
-    let functions = walk::functions(ast);
-    let mut walker = Walker::new(&functions, textures);
-    match walk_surface(&mut walker, ast, params) {
+    let functions = link::functions(ast);
+    analyse_functions(&functions, Some(&("surface".to_owned(), 2)), params, textures)
+}
+
+/// The same for a program.
+pub(super) fn analyse_program(program: &Program, params: &Params, textures: &[Arc<Texture>]) -> Analysis {
+    analyse_functions(&program.functions, program.surface_key(), params, textures)
+}
+
+fn analyse_functions(
+    functions: &Functions,
+    surface: Option<&(String, usize)>,
+    params: &Params,
+    textures: &[Arc<Texture>],
+) -> Analysis {
+    let mut walker = Walker::new(functions, textures);
+    match walk_surface(&mut walker, surface, params) {
         Ok(Some(record)) => {
             let mut analysis = Analysis::empty(walker.inputs);
             for (key, field) in &record.fields {
@@ -118,19 +137,20 @@ pub fn unknown() -> Analysis {
 }
 
 /// The record that `surface` returns; `None` if it never returns.
-fn walk_surface(walker: &mut Walker, ast: &rhai::AST, params: &Params) -> Flow<Option<Rc<Record>>> {
+fn walk_surface(
+    walker: &mut Walker,
+    surface: Option<&(String, usize)>,
+    params: &Params,
+) -> Flow<Option<Rc<Record>>> {
     let start = rhai::Position::NONE;
-    if let Some(statement) = ast.statements().first() {
-        return walker.give_up(statement.position(), "code outside of functions");
-    }
-    let Some(function) = walker.script_function("surface", 2) else {
+    let Some(function) = surface.and_then(|(name, count)| walker.script_function(name, *count)) else {
         return walker.give_up(start, "a script without `surface(hit, p)`");
     };
     let mut fields = Record { is_params: true, ..Record::default() };
     for (name, value) in params.0.iter() {
         let shape = Shape::from_value(value, walker.textures.len(), &mut || walker.fresh());
         let value = Abstract::constant(shape, walker.fresh());
-        fields.fields.insert(name.as_str().into(), Field::always(value, (0, 0)));
+        fields.fields.insert(name.as_str().into(), Field::always(value, NOWHERE));
     }
     let parameters = Abstract::constant(Shape::Record(Rc::new(fields)), walker.fresh());
     let arguments = vec![walker.constant(Shape::Hit), parameters];
@@ -183,7 +203,7 @@ impl Analysis {
                 let names = OutputSet::named().map(|(name, _)| name);
                 let message = format!("there is no output `{key}`");
                 let hint = nearest_hint(key, names);
-                walker.findings.insert(Finding { place: field.place, message, hint });
+                walker.findings.insert(Finding::new(field.place, message, hint));
             }
         }
     }
@@ -252,9 +272,18 @@ impl fmt::Display for Analysis {
     }
 }
 
+impl Finding {
+    fn new((file, line, column): Place, message: String, hint: Option<String>) -> Self {
+        Self { file, place: (line, column), message, hint }
+    }
+}
+
 impl fmt::Display for Finding {
-    /// `line:column: message (hint)`
+    /// `line:column: message (hint)`; in modules with the number of the file before it.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.file > 0 {
+            write!(f, "module {}:", self.file)?;
+        }
         write!(f, "{}:{}: {}", self.place.0, self.place.1, self.message)?;
         match &self.hint {
             Some(hint) => write!(f, " ({hint})"),

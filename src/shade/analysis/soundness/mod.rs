@@ -13,10 +13,11 @@ use proptest::test_runner::TestRunner;
 use rhai::{Caches, Dynamic, Engine, Map};
 
 use super::inputs::LIMIT;
-use super::{Analysis, OutputFact, analyse};
+use super::{Analysis, OutputFact, analyse_program};
 use crate::diag::Source;
 use crate::math::{Affine2, Vec2, Vec3, Vec4};
 use crate::scene::ids::TextureId;
+use crate::scene::material::ScriptFiles;
 use crate::scene::texture::{Image, Pixels, Texture, TextureFilter, TextureRef, Wrap};
 use crate::shade::batch::{HitBatch, LightSample};
 use crate::shade::host::Host;
@@ -225,8 +226,8 @@ fn hidden_dependence(
 /// Parses and analyses a script. `None` if the analysis gave up.
 fn claims(bench: &Bench, text: &str) -> Result<Option<(Program, Analysis)>, String> {
     let source = Arc::new(Source { name: "generated.rhai".into(), text: text.into() });
-    let program = Program::parse(&bench.engine, &source).map_err(|faults| format!("{faults}\n{text}"))?;
-    let found = analyse(&program.ast, &bench.params, &bench.textures);
+    let program = Program::parse(&source, &ScriptFiles::default()).map_err(|faults| format!("{faults}\n{text}"))?;
+    let found = analyse_program(&program, &bench.params, &bench.textures);
     Ok(found.complete.then_some((program, found)))
 }
 
