@@ -4,6 +4,7 @@
 //! a scene by hand does. [`SceneBuilder::build`] checks what must hold between the parts, and from then on every id is
 //! in range, every number finite, and no default is left to choose.
 
+pub mod attributes;
 pub mod camera;
 pub mod file;
 pub mod framing;
@@ -21,6 +22,7 @@ use std::sync::Arc;
 
 use crate::diag::{Diagnostic, Diagnostics, Span};
 use crate::math::DAffine3;
+use attributes::{AttributeTable, Attributes};
 use camera::Camera;
 use ids::{MaterialId, MeshId, ObjectId, ScriptId, TextureId};
 use light::Light;
@@ -55,6 +57,7 @@ pub struct Object {
 pub struct Scene {
     parts: SceneBuilder,
     camera: Camera,
+    attributes: AttributeTable,
 }
 
 impl Scene {
@@ -98,6 +101,12 @@ impl Scene {
     #[must_use]
     pub fn scripts(&self) -> &[Script] {
         &self.parts.scripts
+    }
+
+    /// The attributes of all objects.
+    #[must_use]
+    pub fn attributes(&self) -> &AttributeTable {
+        &self.attributes
     }
 
     /// The files that scripts name.
@@ -152,6 +161,8 @@ pub struct SceneBuilder {
     pub time: f32,
     /// All objects.
     pub objects: Vec<Object>,
+    /// Attributes of objects and materials.
+    pub attributes: Attributes,
     /// All meshes.
     pub meshes: Vec<Arc<Mesh>>,
     /// All materials.
@@ -221,7 +232,10 @@ impl SceneBuilder {
         check::check(&self, &mut faults);
         let camera = self.chosen_camera().map_err(|fault| faults.push(fault)).ok().cloned();
         match camera {
-            Some(camera) if !faults.has_errors() => Ok(Scene { parts: self, camera }),
+            Some(camera) if !faults.has_errors() => {
+                let attributes = self.attributes.table(&self.objects);
+                Ok(Scene { parts: self, camera, attributes })
+            }
             _ => Err(faults),
         }
     }

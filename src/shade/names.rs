@@ -54,11 +54,14 @@ bitflags! {
         const LIGHT = 1 << 21;
         /// uv sets beyond the first, by `texture` lookups.
         const MORE_UVS = 1 << 22;
+        /// `attribute(name, default)`: a value that the object (scene file, model `extras`) or else its material (model
+        /// `extras`) has under this name; the default where none has. Columns: which set of attributes each hit has.
+        const ATTRIBUTE = 1 << 23;
     }
 }
 
 /// What scripts read on `hit`, with its spelling, in the order of the bits. `MORE_UVS` is no property: `texture` reads it.
-const INPUT_NAMES: [(&str, InputSet); 22] = [
+const INPUT_NAMES: [(&str, InputSet); 23] = [
     ("position", InputSet::POSITION),
     ("normal", InputSet::NORMAL),
     ("geometric_normal", InputSet::GEOMETRIC_NORMAL),
@@ -81,9 +84,13 @@ const INPUT_NAMES: [(&str, InputSet); 22] = [
     ("irradiance", InputSet::IRRADIANCE),
     ("light_count", InputSet::LIGHT_COUNT),
     ("light", InputSet::LIGHT),
+    ("attribute", InputSet::ATTRIBUTE),
 ];
 
 impl InputSet {
+    /// The inputs that are called, as `hit.light(i)`, and not read as properties.
+    pub const CALLED: Self = Self::LIGHT.union(Self::ATTRIBUTE);
+
     /// The inputs that need light samples (and with them shadow rays).
     pub const LIGHTS: Self = Self::IRRADIANCE.union(Self::LIGHT);
 

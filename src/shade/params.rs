@@ -46,7 +46,7 @@ pub struct Params(pub Arc<BTreeMap<String, Value>>);
 
 impl Value {
     /// What the value is called in messages.
-    fn kind(&self) -> &'static str {
+    pub(super) fn kind(&self) -> &'static str {
         match self {
             Self::Unit | Self::Texture(_) => "a texture",
             Self::Bool(_) => "true or false",
@@ -62,7 +62,7 @@ impl Value {
     }
 
     /// A script's value, if parameters can be such.
-    fn from_script(value: &Dynamic) -> Option<Self> {
+    pub(super) fn from_script(value: &Dynamic) -> Option<Self> {
         if value.is_unit() {
             return Some(Self::Unit);
         }
@@ -93,6 +93,11 @@ impl Value {
         let map = value.as_map_ref().ok()?;
         let entries = map.iter().map(|(key, value)| Some((key.to_string(), Self::from_script(value)?)));
         entries.collect::<Option<_>>().map(Self::Record)
+    }
+
+    /// Whether it is of a type that attributes can have.
+    pub(super) fn can_be_attribute(&self) -> bool {
+        !matches!(self, Self::Unit | Self::Texture(_) | Self::Record(_) | Self::Array(_))
     }
 
     /// A material's value in place of this default, if it is of its type. An int may stand for a float.

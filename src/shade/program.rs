@@ -116,11 +116,13 @@ impl Shaders {
             .collect();
 
         let mut shaders = Vec::new();
-        for material in scene.materials() {
+        for (index, material) in scene.materials().iter().enumerate() {
+            let sets = scene.attributes().of_material(MaterialId::from_index(index));
+            let attributes: Vec<_> = sets.keys().map(|set| &scene.attributes().sets()[*set as usize]).collect();
             let Some((program, defaults)) = &scripts[material.script.index()] else { continue };
             match params::resolve(defaults.clone(), material, program) {
                 Ok(params) => {
-                    let analysis = analysis::analyse_program(program, &params, scene.textures());
+                    let analysis = analysis::analyse_program(program, &params, scene.textures(), &attributes);
                     for finding in &analysis.findings {
                         let fault = program.found(finding);
                         // Materials that share a script share its faults.

@@ -1,5 +1,7 @@
 //! Shading: groups of hits of one material become node attributes, radiance and further rays.
 
+use std::sync::Arc;
+
 use super::ray_tree::{Run, TreeNode, WaveHit, WaveRay};
 use super::wave::{TileTracer, TraceContext, Work, value};
 use crate::clock::CpuClock;
@@ -86,6 +88,9 @@ impl TileTracer<'_> {
         hits.material_id = material.0 + 1;
         hits.time = self.scene.time();
         hits.light_count = self.lighting.len();
+        if plan.inputs.contains(InputSet::ATTRIBUTE) {
+            hits.attributes = Arc::clone(self.scene.attributes().sets());
+        }
         if plan.inputs.intersects(InputSet::LIGHTS) {
             hits.lights.extend_from_slice(lights);
         }
@@ -162,6 +167,9 @@ impl TileTracer<'_> {
         if inputs.contains(InputSet::PIXELS_PER_UNIT) {
             let width = cone_width + self.cone.1 * hit.hit.t;
             batch.pixels_per_unit.push(1.0 / width.max(f32::MIN_POSITIVE));
+        }
+        if inputs.contains(InputSet::ATTRIBUTE) {
+            batch.attribute_set.push(self.scene.attributes().of(hit.hit.object, hit.material));
         }
         if inputs.contains(InputSet::CURVATURE) {
             batch.curvature.push(surface.curvature(object, &hit.hit));

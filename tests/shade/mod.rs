@@ -1,5 +1,6 @@
 //! The script host: what shaders may say, what they mean, and what is said when they are wrong.
 
+mod attributes;
 mod closures;
 mod errors;
 mod library;
@@ -80,6 +81,8 @@ pub fn batch(len: usize) -> HitBatch {
         front_facing: vec![true; len],
         pixels_per_unit: vec![100.0; len],
         curvature: vec![0.5; len],
+        attribute_set: vec![0; len],
+        attributes: Arc::new(vec![Default::default()]),
         lights: rows()
             .flat_map(|_| {
                 [

@@ -343,6 +343,22 @@ pub(super) enum Param {
     Texture(Texture),
 }
 
+/// An attribute's value.
+#[derive(Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(untagged)]
+pub(super) enum Attribute {
+    /// A switch.
+    Bool(bool),
+    /// A whole number.
+    Int(i64),
+    /// A number.
+    Float(#[schemars(range(min = -BRIGHT, max = BRIGHT))] f64),
+    /// A vector or a colour.
+    Vector(#[schemars(length(min = 2, max = 4), inner(range(min = -BRIGHT, max = BRIGHT)))] Vec<f64>),
+    /// A text.
+    Text(String),
+}
+
 /// A texture: an image and how to look it up.
 #[derive(Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -430,6 +446,9 @@ pub(super) struct Object {
     pub lines: bool,
     /// Whether the lights of a model are used. Default: true if this file has no `[[lights]]`.
     pub lights: Option<bool>,
+    /// Values that shaders ask for with `hit.attribute("name", default)`.
+    #[serde(default)]
+    pub attributes: BTreeMap<String, Attribute>,
 }
 
 /// A built-in shape.

@@ -18,6 +18,7 @@ use super::report::Report;
 use crate::diag::nearest;
 use crate::files::FileStore;
 use crate::math::{Vec2, Vec3, Vec4};
+use crate::scene::attributes::{Attribute, AttributeSet};
 use crate::scene::material::Script;
 use crate::scene::texture::{TextureFilter, Wrap};
 use crate::shade::builtin;
@@ -122,6 +123,35 @@ pub(super) fn read(
         report.error(place, "a node with `params` needs a `shader` too");
     }
     extra
+}
+
+/// The attributes that extras hold beside what is meant for Tusche: numbers, arrays of two to four numbers, texts and
+/// switches. Other values are left to whoever wrote them.
+pub(super) fn attributes(extras: &Extras) -> AttributeSet {
+    let record = extras.as_ref().and_then(|extras| serde_json::from_str::<Map<String, Value>>(extras.get()).ok());
+    let entries = record.into_iter().flatten().filter(|(key, _)| key != "tusche");
+    entries.filter_map(|(key, value)| Some((key, attribute(&value)?))).collect()
+}
+
+fn attribute(value: &Value) -> Option<Attribute> {
+    match value {
+        Value::Bool(value) => Some(Attribute::Bool(*value)),
+        Value::String(text) => Some(Attribute::Text(text.clone())),
+        Value::Number(number) => match number.as_i64() {
+            Some(whole) => Some(Attribute::Int(whole)),
+            None => Some(Attribute::Float(float(number.as_f64()).ok()?)),
+        },
+        Value::Array(numbers) => {
+            let numbers: Option<Vec<f32>> = numbers.iter().map(|number| float(number.as_f64()).ok()).collect();
+            match numbers?[..] {
+                [x, y] => Some(Attribute::Vec2(Vec2::new(x, y))),
+                [x, y, z] => Some(Attribute::Vec3(Vec3::new(x, y, z))),
+                [x, y, z, w] => Some(Attribute::Vec4(Vec4::new(x, y, z, w))),
+                _ => None,
+            }
+        }
+        Value::Object(_) | Value::Null => None,
+    }
 }
 
 fn unknown(key: &str, known: &[&str]) -> String {

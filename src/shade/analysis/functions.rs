@@ -75,6 +75,9 @@ impl Walker<'_> {
         let value = match arguments {
             [hit, texture] if hit.shape == Shape::Hit && name == "texture" => self.texture_at_hit(texture),
             [hit, index] if hit.shape == Shape::Hit && name == "light" => self.light(index),
+            [hit, of, default] if hit.shape == Shape::Hit && name == "attribute" => {
+                self.attribute(of, default, position)?
+            }
             [texture, uv] if name == "texture" => {
                 let shape = self.texture_bounds(&texture.shape);
                 let inputs = self.escape(texture) | self.escape(uv);

@@ -5,23 +5,29 @@
 
 use std::rc::Rc;
 
+use rhai::Position;
+
 use super::interval::Interval;
 use super::value::{Abstract, Field, NOWHERE, Record, Shape, Vector};
-use super::walk::Walker;
+use super::walk::{Flow, Stop, Walker};
+use crate::math::{Vec2, Vec3, Vec4};
 use crate::scene::texture::TextureRef;
+use crate::shade::fault::Fault;
+use crate::shade::library::{ATTRIBUTE_TYPES, mistyped_attribute};
 use crate::shade::names::InputSet;
+use crate::shade::params::Value;
 
 /// The greatest magnitude of an input. Its square is still a finite `f32`.
 pub const LIMIT: f32 = 1e18;
 
 /// Names that scripts read as `hit.NAME`.
 pub(super) fn names() -> impl Iterator<Item = &'static str> {
-    InputSet::named().filter(|(_, input)| *input != InputSet::LIGHT).map(|(name, _)| name)
+    InputSet::named().filter(|(_, input)| !InputSet::CALLED.contains(*input)).map(|(name, _)| name)
 }
 
 /// The input of that name.
 pub(super) fn by_name(name: &str) -> Option<InputSet> {
-    InputSet::spelled(name).filter(|input| *input != InputSet::LIGHT)
+    InputSet::spelled(name).filter(|input| !InputSet::CALLED.contains(*input))
 }
 
 /// Type and bounds of an input.
@@ -49,6 +55,22 @@ pub(super) fn shape(input: InputSet) -> Shape {
     }
 }
 
+/// Any value of a type that attributes can have.
+fn type_of(shape: &Shape) -> Option<Value> {
+    Some(match shape {
+        Shape::Bool(_) => Value::Bool(false),
+        Shape::Int(..) => Value::Int(0),
+        Shape::Float(_) => Value::Float(0.0),
+        Shape::Text(_) => Value::Text(String::new()),
+        Shape::Vector(vector) => match vector.channels.len() {
+            2 => Value::Vec2(Vec2::ZERO),
+            3 => Value::Vec3(Vec3::ZERO),
+            _ => Value::Vec4(Vec4::ZERO),
+        },
+        _ => return None,
+    })
+}
+
 impl Walker<'_> {
     /// Reads an input.
     pub(super) fn input(&mut self, input: InputSet) -> Abstract {
@@ -72,6 +94,48 @@ impl Walker<'_> {
             record.fields.insert(name.into(), Field::always(value, NOWHERE));
         }
         self.constant(Shape::Record(Rc::new(record)))
+    }
+
+    /// `hit.attribute(name, default)`: what the material's hits can have under the name.
+    pub(super) fn attribute(&mut self, name: &Abstract, default: &Abstract, position: Position) -> Flow<Abstract> {
+        let Shape::Text(Some(name)) = &name.shape else {
+            self.find_fault(
+                position,
+                "the name of an attribute must be known from the script's text".to_owned(),
+                Some("write: hit.attribute(\"wear\", 0.0)".to_owned()),
+            );
+            return self.give_up(position, "an attribute whose name is not known");
+        };
+        let name = Rc::clone(name);
+        self.attributes.insert(name.to_string());
+        let mut joined = default.clone();
+        let sets = self.attribute_sets;
+        for given in sets.iter().map(|set| set.get(&*name)) {
+            let value = match (given, type_of(&default.shape)) {
+                (_, None) if default.shape.is_typed() => {
+                    let message = "an attribute cannot be of this type".to_owned();
+                    self.find_fault(position, message, Some(ATTRIBUTE_TYPES.to_owned()));
+                    return Err(Stop::Left);
+                }
+                (None, _) => continue,
+                (Some(_), None) => self.value(Shape::Unknown, InputSet::ATTRIBUTE),
+                (Some(given), Some(wanted)) => match given.for_default(&wanted) {
+                    Some(value) => {
+                        let shape = Shape::from_value(&value, 0, &mut || 0);
+                        self.value(shape, InputSet::empty())
+                    }
+                    None => {
+                        let Fault { message, hints } = mistyped_attribute(&name, given, &wanted);
+                        self.find_fault(position, message, hints.into_iter().next());
+                        return Err(Stop::Left);
+                    }
+                },
+            };
+            // Which it is, the object tells.
+            self.inputs |= InputSet::ATTRIBUTE;
+            joined = self.join_values(&joined, &value, InputSet::ATTRIBUTE);
+        }
+        Ok(joined)
     }
 
     /// `hit.texture(texture)`.

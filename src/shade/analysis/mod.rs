@@ -41,6 +41,7 @@ use super::link;
 use super::params::{Params, Value};
 use super::script::{Functions, Program};
 use crate::diag;
+use crate::scene::attributes::AttributeSet;
 use crate::scene::texture::Texture;
 
 /// What is known of one output.
@@ -80,6 +81,8 @@ pub struct Analysis {
     pub outputs: Vec<OutputFact>,
     /// Extra outputs, by name without `aov_`, sorted.
     pub aovs: Vec<(String, OutputFact)>,
+    /// Attributes that code which may run asks for, sorted.
+    pub attributes: Vec<String>,
     /// Whether the facts are known to be complete. If not, all inputs are assumed read and all outputs written.
     pub complete: bool,
     /// If not complete: the construct that stopped the analysis.
@@ -93,12 +96,18 @@ pub struct Analysis {
 #[must_use]
 pub fn analyse(ast: &rhai::AST, params: &Params, textures: &[Arc<Texture>]) -> Analysis {
     let functions = link::functions(ast);
-    analyse_functions(&functions, Some(&("surface".to_owned(), 2)), params, textures)
+    analyse_functions(&functions, Some(&("surface".to_owned(), 2)), params, textures, &[])
 }
 
 /// The same for a program.
-pub(super) fn analyse_program(program: &Program, params: &Params, textures: &[Arc<Texture>]) -> Analysis {
-    analyse_functions(&program.functions, program.surface_key(), params, textures)
+/// `attributes` are the sets that hits of the material can have.
+pub(super) fn analyse_program(
+    program: &Program,
+    params: &Params,
+    textures: &[Arc<Texture>],
+    attributes: &[&AttributeSet],
+) -> Analysis {
+    analyse_functions(&program.functions, program.surface_key(), params, textures, attributes)
 }
 
 fn analyse_functions(
@@ -106,8 +115,9 @@ fn analyse_functions(
     surface: Option<&(String, usize)>,
     params: &Params,
     textures: &[Arc<Texture>],
+    attributes: &[&AttributeSet],
 ) -> Analysis {
-    let mut walker = Walker::new(functions, textures);
+    let mut walker = Walker::new(functions, textures, attributes);
     match walk_surface(&mut walker, surface, params) {
         Ok(Some(record)) => {
             let mut analysis = Analysis::empty(walker.inputs);
@@ -116,10 +126,15 @@ fn analyse_functions(
             }
             analysis.aovs.sort_by(|a, b| a.0.cmp(&b.0));
             analysis.findings = walker.findings.into_iter().collect();
+            analysis.attributes = walker.attributes.into_iter().collect();
             analysis
         }
         // No path ends without an error, so nothing is ever written.
-        Ok(None) => Analysis { findings: walker.findings.into_iter().collect(), ..Analysis::empty(walker.inputs) },
+        Ok(None) => Analysis {
+            findings: walker.findings.into_iter().collect(),
+            attributes: walker.attributes.into_iter().collect(),
+            ..Analysis::empty(walker.inputs)
+        },
         Err(_) => Analysis { blame: walker.blame, findings: walker.findings.into_iter().collect(), ..unknown() },
     }
 }
@@ -248,6 +263,9 @@ impl fmt::Display for Analysis {
     /// One line for the inputs, one for each output that may be written, one for each finding.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "inputs: {}", InputNames(self.inputs))?;
+        if !self.attributes.is_empty() {
+            writeln!(f, "attributes: {}", self.attributes.join(" "))?;
+        }
         if !self.complete {
             f.write_str("incomplete")?;
             if let Some(blame) = &self.blame {

@@ -8,6 +8,7 @@ use rhai::Position;
 
 use super::Finding;
 use super::value::{Abstract, Cell, Identity, Join, Place, Shape};
+use crate::scene::attributes::AttributeSet;
 use crate::scene::texture::Texture;
 use crate::shade::names::InputSet;
 use crate::shade::script::Functions;
@@ -93,6 +94,10 @@ pub(super) struct Call {
 pub(super) struct Walker<'a> {
     pub functions: &'a Functions,
     pub textures: &'a [Arc<Texture>],
+    /// The sets of attributes that hits of the material can have.
+    pub attribute_sets: &'a [&'a AttributeSet],
+    /// Names of attributes that were asked for.
+    pub attributes: BTreeSet<String>,
     /// Bounds of the textures that were looked up, which cost a look at all pixels, by their index.
     pub texture_bounds: BTreeMap<usize, Shape>,
     /// The innermost call is the last.
@@ -108,10 +113,12 @@ pub(super) struct Walker<'a> {
 }
 
 impl<'a> Walker<'a> {
-    pub fn new(functions: &'a Functions, textures: &'a [Arc<Texture>]) -> Self {
+    pub fn new(functions: &'a Functions, textures: &'a [Arc<Texture>], attribute_sets: &'a [&'a AttributeSet]) -> Self {
         Self {
             functions,
             textures,
+            attribute_sets,
+            attributes: BTreeSet::new(),
             texture_bounds: BTreeMap::new(),
             calls: vec![Call::default()],
             inputs: InputSet::empty(),

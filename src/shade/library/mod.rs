@@ -23,7 +23,7 @@ use std::collections::BTreeSet;
 
 use rhai::Engine;
 
-pub(super) use hit::Hit;
+pub(super) use hit::{ATTRIBUTE_TYPES, Hit, mistyped_attribute};
 pub(super) use math::CONSTANTS;
 pub(super) use operand::kind;
 pub(super) use parameters::ParameterRecord;
