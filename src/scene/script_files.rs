@@ -1,19 +1,23 @@
-//! The files that scripts name: modules.
+//! The files that scripts name: modules and images.
 //!
 //! A module is written relative to the script that imports it, with `/` between folders and with or without `.rhai`:
 //! `import "lib/hatching" as h` beside `shaders/ink.rhai` means `shaders/lib/hatching.rhai`. `..` leads to the folder
 //! above. Absolute paths are refused, so that a folder of shaders can be moved. `builtin:lib/hatching` names a module
-//! that comes with Tusche; the imports of built-in files are built in, too.
+//! that comes with Tusche; the imports of built-in files are built in, too. Images are written in the same way, with
+//! their extension: `texture("grain.png", uv)`.
 
 use std::collections::BTreeSet;
 use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
 use super::SceneBuilder;
+use super::ids::TextureId;
+use super::material::TextureKey;
+use super::texture::{self, Image, Texture, TextureFilter, Wrap};
 use crate::diag::{Diagnostic, Diagnostics, Source, Span, nearest};
 use crate::files::FileStore;
 use crate::shade::builtin;
-use crate::shade::requests::{Requests, requests};
+use crate::shade::requests::{Requests, TextureRequest, requests};
 
 /// What built-in shaders and modules are called: this and a name.
 pub const BUILTIN: &str = "builtin:";
@@ -26,11 +30,18 @@ pub fn load(scene: &mut SceneBuilder, files: &FileStore, faults: &mut Diagnostic
     let mut open: Vec<(Arc<Source>, Option<PathBuf>)> =
         scene.scripts.iter().map(|script| (Arc::clone(&script.source), script.path.clone())).collect();
     let mut seen = BTreeSet::new();
+    let mut images = Vec::new();
     while let Some((source, path)) = open.pop() {
         if seen.len() > MAX_FILES || !seen.insert(source.name.clone()) {
             continue;
         }
-        let Requests { modules } = requests(&source);
+        let Requests { modules, textures } = requests(&source);
+        for request in textures {
+            match texture(&source, path.as_deref(), &request, scene, files, &mut images) {
+                Ok((key, id)) => _ = scene.script_files.textures.insert(key, id),
+                Err(fault) => faults.push(fault),
+            }
+        }
         for (written, span) in modules {
             match module(&source, path.as_deref(), &written, files) {
                 Ok((module, path)) => {
@@ -81,6 +92,78 @@ fn module(
         with_nearest(Diagnostic::error(message), &path, &["rhai"])
     })?;
     Ok((source, Some(path)))
+}
+
+/// Images that were read, by path and whether they are sRGB-encoded.
+type Images = Vec<(PathBuf, bool, Arc<Image>)>;
+
+const WRAPS: [(&str, Wrap); 3] = [("repeat", Wrap::Repeat), ("mirror", Wrap::Mirror), ("clamp", Wrap::Clamp)];
+const COLORS: [(&str, bool); 2] = [("srgb", true), ("linear", false)];
+
+fn texture(
+    script: &Source,
+    path: Option<&Path>,
+    request: &TextureRequest,
+    scene: &mut SceneBuilder,
+    files: &FileStore,
+    images: &mut Images,
+) -> Result<(TextureKey, TextureId), Diagnostic> {
+    let mut options = request.options.iter();
+    let (wrap_name, wrap) = option(options.next(), &WRAPS, "wrap mode")?;
+    let (color, srgb) = option(options.next(), &COLORS, "colour encoding")?;
+    if script.name.starts_with(BUILTIN) {
+        return Err(Diagnostic::error("a built-in script cannot name an image").at(request.span.clone()));
+    }
+    let path = beside(path, &request.path).map_err(|fault| place(fault, request.span.clone()))?;
+    let known = images.iter().find(|(known, encoded, _)| *known == path && *encoded == srgb);
+    let image = match known {
+        Some((.., image)) => Arc::clone(image),
+        None => {
+            let bytes = files.read(&path).map_err(|fault| {
+                let message = format!("cannot read the image {}: {}", path.display(), reason(&fault));
+                let fault = with_nearest(Diagnostic::error(message), &path, &["png", "jpg", "jpeg", "hdr", "exr"]);
+                place(fault, request.span.clone())
+            })?;
+            let decoded = texture::decode(&path, &bytes, srgb).map_err(|fault| {
+                let message = format!("{}: {}", path.display(), fault.message);
+                place(Diagnostic { message, ..fault }, request.span.clone())
+            })?;
+            let image = Arc::new(decoded);
+            images.push((path, srgb, Arc::clone(&image)));
+            image
+        }
+    };
+    let texture = Texture { name: request.path.clone(), image, wrap: [wrap; 2], filter: TextureFilter::Linear };
+    let id = scene.add_texture(texture);
+    let key = TextureKey {
+        script: script.name.clone(),
+        path: request.path.clone(),
+        wrap: wrap_name.to_owned(),
+        color: color.to_owned(),
+    };
+    Ok((key, id))
+}
+
+/// An option by its name; the first where none is written.
+fn option<T: Copy>(
+    written: Option<&(Option<String>, Span)>,
+    known: &[(&'static str, T)],
+    what: &str,
+) -> Result<(&'static str, T), Diagnostic> {
+    let Some((text, span)) = written else { return Ok(known[0]) };
+    let fault = match text {
+        None => Diagnostic::error(format!("the {what} of a texture must be written out as a text")),
+        Some(text) => match known.iter().find(|(name, _)| name == text) {
+            Some(found) => return Ok(*found),
+            None => Diagnostic::error(format!("there is no {what} `{text}`")),
+        },
+    };
+    let names = known.iter().map(|(name, _)| *name);
+    let near = text.as_ref().and_then(|text| nearest(text, names.clone()));
+    Err(fault.at(span.clone()).hint(match near {
+        Some(near) => format!("did you mean `{near}`?"),
+        None => format!("there are: {}", names.collect::<Vec<_>>().join(", ")),
+    }))
 }
 
 /// Why a file could not be read.

@@ -14,6 +14,7 @@ use rhai::packages::{
 use rhai::{Engine, FloatWrapper, LexError, OptimizationLevel, Position, Token};
 
 use super::library;
+use crate::scene::texture::Texture;
 
 /// Operations of one call of `surface` or `params`: enough for thousands of noise lookups, and a fraction of a second.
 pub(super) const MAX_OPERATIONS: u64 = 500_000;
@@ -58,8 +59,8 @@ impl Host {
         self
     }
 
-    /// A new engine. `parameters` are the names that scripts may ask of `p`.
-    pub(super) fn engine(&self, parameters: &BTreeSet<String>) -> Engine {
+    /// A new engine. `parameters` are the names that scripts may ask of `p`, `textures` the scene's.
+    pub(super) fn engine(&self, parameters: &BTreeSet<String>, textures: &[Arc<Texture>]) -> Engine {
         let mut engine = Engine::new_raw();
         ArithmeticPackage::new().register_into_engine(&mut engine);
         LogicPackage::new().register_into_engine(&mut engine);
@@ -67,7 +68,7 @@ impl Host {
         BasicStringPackage::new().register_into_engine(&mut engine);
         BasicArrayPackage::new().register_into_engine(&mut engine);
         BasicMapPackage::new().register_into_engine(&mut engine);
-        library::register(&mut engine, parameters);
+        library::register(&mut engine, parameters, textures);
         for register in &self.packages {
             register(&mut engine);
         }

@@ -5,8 +5,9 @@
 //! run share, so that two files with a function of one name see each other's. Here each file is parsed twice. The first
 //! parse tells which word calls or defines which function; in the second, each of these words gets a tail that tells
 //! the file (`stroke` of file 2 becomes `stroke__2`). Then all functions fit into one table, and neither the
-//! interpreter, the analysis nor the kernels know of files, but for the places in messages. A script without imports
-//! is parsed once and stays as it is.
+//! interpreter, the analysis nor the kernels know of files, but for the places in messages. In the same way the path of
+//! an image that a script names becomes the number of the scene's texture. A script that names no file is parsed once
+//! and stays as it is.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -16,9 +17,10 @@ use rhai::{AST, ASTNode, Engine, Expr, FnAccess, FnCallExpr, Module, Position, S
 use super::closures;
 use super::fault::{Fault, from_parse_error, span};
 use super::host;
+use super::library;
 use super::script::{Functions, ScriptFunction, name_span};
 use crate::diag::{Diagnostics, Source, nearest};
-use crate::scene::material::ScriptFiles;
+use crate::scene::material::{ScriptFiles, TextureKey};
 
 /// The most modules of a script.
 pub(super) const MAX_MODULES: usize = 64;
@@ -61,13 +63,14 @@ pub(super) fn link(source: &Arc<Source>, known: &ScriptFiles) -> Result<Linked, 
     if faults.has_errors() {
         return Err(faults);
     }
+    let names_textures = files.iter().any(|file| !textures(&file.ast).is_empty());
     let linked = match files.as_slice() {
-        [only] => {
+        [only] if !names_textures => {
             let mut functions = Functions::new();
             add_functions(&mut functions, source, &only.ast, 0, "");
             Linked { files: vec![Arc::clone(source)], ast: only.ast.clone(), functions, module: None }
         }
-        _ => join(&files, &mut faults)?,
+        _ => join(&files, known, &mut faults)?,
     };
     for (index, file) in linked.files.iter().enumerate() {
         closures::check(&linked.functions, file, index, &mut faults);
@@ -194,8 +197,48 @@ fn compile(engine: &Engine, source: &Arc<Source>) -> Result<AST, crate::diag::Di
     engine.compile(source.text.as_str()).map_err(|error| from_parse_error(&error, source))
 }
 
+/// An image that a script names: `texture("grain.png", uv, "clamp", "linear")`.
+pub(super) struct NamedTexture {
+    pub path: String,
+    pub path_position: Position,
+    /// How it continues outside of 0 … 1, and how its colours are encoded, as far as written.
+    pub options: Vec<(Option<String>, Position)>,
+}
+
+/// The images that the functions of a syntax tree name.
+pub(super) fn textures(ast: &AST) -> Vec<NamedTexture> {
+    let own: BTreeSet<usize> =
+        ast.iter_fn_def().filter(|function| function.name == "texture").map(|function| function.params.len()).collect();
+    let mut found = Vec::new();
+    each_call(ast, |call, _| {
+        if call.name != "texture" || call.is_qualified() || own.contains(&call.args.len()) {
+            return;
+        }
+        if let [Expr::StringConstant(path, path_position), _, options @ ..] = call.args.as_slice() {
+            let text = |option: &Expr| match option {
+                Expr::StringConstant(text, position) => (Some(text.to_string()), *position),
+                other => (None, other.position()),
+            };
+            let options = options.iter().map(text).collect();
+            found.push(NamedTexture { path: path.to_string(), path_position: *path_position, options });
+        }
+    });
+    found
+}
+
+/// The images that a script names, for those who look them up; none if it cannot be parsed.
+pub(super) fn named_textures(source: &Arc<Source>) -> Vec<NamedTexture> {
+    parse(source).map_or_else(|_| Vec::new(), |(ast, _)| textures(&ast))
+}
+
+/// What a word or a text becomes in the second parse.
+enum Edit {
+    Word(String),
+    Text(String),
+}
+
 /// Gives every function a name of its own, and puts all into one table.
-fn join(files: &[File], faults: &mut Diagnostics) -> Result<Linked, Diagnostics> {
+fn join(files: &[File], known: &ScriptFiles, faults: &mut Diagnostics) -> Result<Linked, Diagnostics> {
     let mut tail = "__".to_owned();
     while files.iter().any(|file| file.source.text.contains(&tail)) {
         tail.push('_');
@@ -205,9 +248,22 @@ fn join(files: &[File], faults: &mut Diagnostics) -> Result<Linked, Diagnostics>
     let mut public = Module::new();
     let mut functions = Functions::new();
     for (index, file) in files.iter().enumerate() {
-        let edits = edits(files, index, &tail, &namespace, faults);
-        let engine = host::parser(move |token, position| match edits.get(&position) {
-            Some(name) if matches!(token, Token::Identifier(_)) => Token::Identifier(Box::new(name.as_str().into())),
+        let mut edits = edits(files, index, &tail, &namespace, faults);
+        for texture in textures(&file.ast) {
+            let key = texture.key(&file.source);
+            match key.and_then(|key| known.textures.get(&key)) {
+                Some(id) => _ = edits.insert(texture.path_position, Edit::Text(library::texture_name(*id))),
+                None => faults.push(
+                    Fault::new(format!("the image `{}` was not loaded with the scene", texture.path))
+                        .at(span(&file.source, texture.path_position)),
+                ),
+            }
+        }
+        let engine = host::parser(move |token, position| match (edits.get(&position), &token) {
+            (Some(Edit::Word(name)), Token::Identifier(_)) => Token::Identifier(Box::new(name.as_str().into())),
+            (Some(Edit::Text(text)), Token::StringConstant(_)) => {
+                Token::StringConstant(Box::new(text.as_str().into()))
+            }
             _ => token,
         });
         let ast = match compile(&engine, &file.source) {
@@ -217,7 +273,8 @@ fn join(files: &[File], faults: &mut Diagnostics) -> Result<Linked, Diagnostics>
                 continue;
             }
         };
-        add_functions(&mut functions, &file.source, &ast, index, &format!("{tail}{index}"));
+        let tail = if files.len() == 1 { String::new() } else { format!("{tail}{index}") };
+        add_functions(&mut functions, &file.source, &ast, index, &tail);
         for function in ast.iter_fn_def() {
             library.set_script_fn(Arc::clone(function));
             if function.access == FnAccess::Public {
@@ -233,8 +290,25 @@ fn join(files: &[File], faults: &mut Diagnostics) -> Result<Linked, Diagnostics>
         files: files.iter().map(|file| Arc::clone(&file.source)).collect(),
         ast: AST::new([], library),
         functions,
-        module: Some((namespace, Arc::new(public))),
+        module: (files.len() > 1).then(|| (namespace, Arc::new(public))),
     })
+}
+
+impl NamedTexture {
+    /// By which the scene's files know it; `None` if an option is not written out.
+    pub fn key(&self, source: &Source) -> Option<TextureKey> {
+        let mut options = self.options.iter();
+        let mut next = |default: &str| match options.next() {
+            Some((text, _)) => text.clone(),
+            None => Some(default.to_owned()),
+        };
+        Some(TextureKey {
+            script: source.name.clone(),
+            path: self.path.clone(),
+            wrap: next("repeat")?,
+            color: next("srgb")?,
+        })
+    }
 }
 
 /// What some words of a file become, by place: where functions are defined or called, and the names of modules.
@@ -244,9 +318,12 @@ fn edits(
     tail: &str,
     namespace: &str,
     faults: &mut Diagnostics,
-) -> BTreeMap<Position, String> {
+) -> BTreeMap<Position, Edit> {
     let file = &files[index];
     let mut edits = BTreeMap::new();
+    if files.len() == 1 {
+        return edits;
+    }
     let own: BTreeSet<(&str, usize)> =
         file.ast.iter_fn_def().map(|function| (function.name.as_str(), function.params.len())).collect();
     for (at, (token, _)) in file.tokens.iter().enumerate() {
@@ -259,12 +336,12 @@ fn edits(
                 // A function may be for one type of `this`: fn int.double().
                 let typed = matches!(file.tokens.get(at + 2), Some((Token::Period, _)));
                 if let Some((name, position)) = name(if typed { 3 } else { 1 }) {
-                    edits.insert(position, format!("{name}{tail}{index}"));
+                    edits.insert(position, Edit::Word(format!("{name}{tail}{index}")));
                 }
             }
             Token::Import => {
                 if let Some((_, position)) = name(3) {
-                    edits.insert(position, namespace.to_owned());
+                    edits.insert(position, Edit::Word(namespace.to_owned()));
                 }
             }
             _ => {}
@@ -277,7 +354,7 @@ fn edits(
         let count = call.args.len();
         if !call.is_qualified() {
             if own.contains(&(call.name.as_str(), count)) {
-                edits.insert(position, format!("{}{tail}{index}", call.name));
+                edits.insert(position, Edit::Word(format!("{}{tail}{index}", call.name)));
             }
             return;
         }
@@ -286,8 +363,8 @@ fn edits(
         let word = at.and_then(|at| file.tokens.get(at + 2)).map_or(position, |(_, position)| *position);
         match callee(files, file, call, count) {
             Ok(target) => {
-                edits.insert(first, namespace.to_owned());
-                edits.insert(word, format!("{}{tail}{target}", call.name));
+                edits.insert(first, Edit::Word(namespace.to_owned()));
+                edits.insert(word, Edit::Word(format!("{}{tail}{target}", call.name)));
             }
             Err(fault) => faults.push(fault.at(span(&file.source, if call.namespace.path.len() > 1 { first } else { word }))),
         }

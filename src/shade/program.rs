@@ -14,6 +14,7 @@ use super::script::Program;
 use crate::diag::Diagnostics;
 use crate::scene::Scene;
 use crate::scene::ids::MaterialId;
+use crate::scene::texture::Texture;
 
 /// How a material's shader is run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -91,6 +92,8 @@ pub struct Shaders {
     host: Host,
     /// Every name that some script's `params()` has.
     parameters: BTreeSet<String>,
+    /// The scene's, for scripts that name images.
+    textures: Vec<Arc<Texture>>,
 }
 
 impl Shaders {
@@ -100,7 +103,7 @@ impl Shaders {
     /// Every syntax error, missing `surface`, fault in `params()`, unknown or ill-typed parameter, and what the analysis
     /// finds to be certainly wrong (unknown inputs, outputs and parameters in code that may run), at its place.
     pub fn compile(scene: &Scene, host: &Host) -> Result<(Self, Diagnostics), Diagnostics> {
-        let engine = host.engine(&BTreeSet::new());
+        let engine = host.engine(&BTreeSet::new(), scene.textures());
         let mut faults = Diagnostics::default();
         let mut keep = |result: Result<_, Diagnostics>| result.map_err(|found| faults.extend(found)).ok();
 
@@ -146,7 +149,8 @@ impl Shaders {
         }
         let parameters = scripts.iter().flatten().flat_map(|(_, defaults)| defaults.keys().cloned()).collect();
         let aovs = extra_outputs(&shaders);
-        Ok((Self { shaders, aovs, host: host.clone(), parameters }, faults))
+        let textures = scene.textures().to_vec();
+        Ok((Self { shaders, aovs, host: host.clone(), parameters, textures }, faults))
     }
 
     /// All shaders, in the order of the materials.
@@ -174,7 +178,7 @@ impl Shaders {
 
     /// An engine for one thread: an engine shared by two would make them wait for each other.
     pub(super) fn engine(&self) -> Engine {
-        self.host.engine(&self.parameters)
+        self.host.engine(&self.parameters, &self.textures)
     }
 }
 

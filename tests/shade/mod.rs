@@ -7,6 +7,7 @@ mod library;
 mod modules;
 mod shading;
 mod shipped;
+mod textures;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;

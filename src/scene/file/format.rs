@@ -135,7 +135,7 @@ pub(super) struct Gradient {
 #[derive(Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct BackgroundImage {
-    /// Path of the image: PNG, JPEG or Radiance HDR.
+    /// Path of the image: PNG, JPEG, Radiance HDR or OpenEXR.
     pub image: String,
     /// Multiplies the image.
     #[serde(default = "one")]
@@ -341,6 +341,8 @@ pub(super) enum Param {
     Text(String),
     /// A texture.
     Texture(Texture),
+    /// A texture, in other words.
+    File(TextureFile),
 }
 
 /// An attribute's value.
@@ -374,6 +376,34 @@ pub(super) struct Texture {
     /// Whether the image holds sRGB colours; false for widths, masks and other data.
     #[serde(default = "yes")]
     pub srgb: bool,
+}
+
+/// A texture: an image and how to look it up.
+#[derive(Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct TextureFile {
+    /// Path of the image: PNG, JPEG, Radiance HDR or OpenEXR.
+    pub file: String,
+    /// What happens outside 0 … 1, in u and in v.
+    #[serde(default)]
+    pub wrap: Wrap,
+    /// How pixels are interpolated.
+    #[serde(default)]
+    pub filter: TextureFilter,
+    /// How colours are encoded: "linear" for widths, masks and other data. Floats are always linear.
+    #[serde(default)]
+    pub color: Encoding,
+}
+
+/// How the colours of an image are encoded.
+#[derive(Clone, Copy, Debug, Default, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum Encoding {
+    /// As for screens.
+    #[default]
+    Srgb,
+    /// As they are.
+    Linear,
 }
 
 /// What happens outside 0 … 1.

@@ -179,9 +179,9 @@ impl<'a> Walker<'a> {
         let (value, changed) = self.native_call(name, &arguments, position)?;
         if let (Some(variable), Some(first), Some(changed)) = (by_reference, call.args.first(), changed) {
             // Of a variable that a closure shares, the engine passes a copy; whether it is shared may hang on the path.
-            let is_shared = self.find(variable).is_some_and(|variable| variable.cell.is_some());
-            let control = self.control();
-            let changed = if is_shared { self.join_values(&arguments[0], &changed, control) } else { changed };
+            if self.find(variable).is_some_and(|variable| variable.cell.is_some()) {
+                return self.give_up(position, &format!("`{name}`, which would change a variable that a closure captures,"));
+            }
             self.store(first, changed)?;
         }
         Ok(value)

@@ -10,10 +10,10 @@ use rhai::Position;
 use super::interval::Interval;
 use super::value::{Abstract, Field, NOWHERE, Record, Shape, Vector};
 use super::walk::{Flow, Stop, Walker};
-use crate::math::{Vec2, Vec3, Vec4};
+use crate::math::{Affine2, Vec2, Vec3, Vec4};
 use crate::scene::texture::TextureRef;
 use crate::shade::fault::Fault;
-use crate::shade::library::{ATTRIBUTE_TYPES, mistyped_attribute};
+use crate::shade::library::{ATTRIBUTE_TYPES, mistyped_attribute, texture_of, unwritten_path};
 use crate::shade::names::InputSet;
 use crate::shade::params::Value;
 
@@ -149,6 +149,23 @@ impl Walker<'_> {
         let shape = self.texture_bounds(&texture.shape);
         let inputs = read | self.escape(texture);
         self.value(shape, inputs)
+    }
+
+    /// `texture("file.png", uv, …)`.
+    pub(super) fn named_texture(&mut self, arguments: &[Abstract], position: Position) -> Flow<Abstract> {
+        let id = match &arguments[0].shape {
+            Shape::Text(Some(text)) => texture_of(text).filter(|id| id.index() < self.textures.len()),
+            _ => None,
+        };
+        let Some(texture) = id else {
+            let Fault { message, hints } = unwritten_path();
+            self.find_fault(position, message, hints.into_iter().next());
+            return Err(Stop::Left);
+        };
+        let place = TextureRef { texture, uv_set: 0, transform: Affine2::IDENTITY };
+        let shape = self.texture_bounds(&Shape::Texture(Some(place)));
+        let inputs = arguments.iter().map(|argument| self.escape(argument)).collect();
+        Ok(self.value(shape, inputs))
     }
 
     /// What a lookup in a texture can give.

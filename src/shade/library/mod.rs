@@ -14,19 +14,24 @@ mod math;
 mod noise;
 mod operand;
 mod parameters;
+mod pattern;
 mod ramp;
 mod swizzle;
 mod texture;
 mod vectors;
 
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 use rhai::Engine;
+
+use crate::scene::texture::Texture;
 
 pub(super) use hit::{ATTRIBUTE_TYPES, Hit, mistyped_attribute};
 pub(super) use math::CONSTANTS;
 pub(super) use operand::kind;
 pub(super) use parameters::ParameterRecord;
+pub(super) use texture::{texture_name, texture_of, unwritten_path};
 
 /// A function of the library, for messages and reference pages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,6 +52,7 @@ pub fn functions() -> impl Iterator<Item = Function> + Clone {
         color::FUNCTIONS,
         ramp::FUNCTIONS,
         noise::FUNCTIONS,
+        pattern::FUNCTIONS,
         hash::FUNCTIONS,
         texture::FUNCTIONS,
         hit::FUNCTIONS,
@@ -57,7 +63,8 @@ pub fn functions() -> impl Iterator<Item = Function> + Clone {
 }
 
 /// Registers the library. `names` are the parameters that scripts may ask of `p`.
-pub(super) fn register(engine: &mut Engine, names: &BTreeSet<String>) {
+/// `textures` are the scene's.
+pub(super) fn register(engine: &mut Engine, names: &BTreeSet<String>, textures: &[Arc<Texture>]) {
     compare::register(engine);
     vectors::register(engine);
     swizzle::register(engine);
@@ -65,8 +72,9 @@ pub(super) fn register(engine: &mut Engine, names: &BTreeSet<String>) {
     color::register(engine);
     ramp::register(engine);
     noise::register(engine);
+    pattern::register(engine);
     hash::register(engine);
-    texture::register(engine);
+    texture::register(engine, textures);
     hit::register(engine);
     parameters::register(engine, names);
 }

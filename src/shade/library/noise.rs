@@ -8,7 +8,8 @@ use rhai::{Dynamic, Engine};
 
 use super::Function;
 use super::math::clamp;
-use super::operand::{Operand, Outcome, refuse};
+use super::operand::{Operand, Outcome, number, refuse};
+use crate::math::Vec2;
 use crate::shade::fault::Fault;
 
 pub(super) const FUNCTIONS: &[Function] = &[
@@ -31,6 +32,17 @@ pub(super) const FUNCTIONS: &[Function] = &[
         name: "cell_id",
         form: "cell_id(point)",
         about: "a number 0 … 1 that belongs to the nearest scattered point",
+    },
+    Function {
+        name: "worley",
+        form: "worley(point)",
+        about: "vec2 of the distance F1 to the nearest of scattered points, as `cellular_noise`, and F2 − F1, 0 on the \
+                border between two cells",
+    },
+    Function {
+        name: "fbm",
+        form: "fbm(point, octaves, lacunarity, gain)",
+        about: "the same, each octave `lacunarity` (1 … 4) times as fine and `gain` (0 … 1) times as strong as the last",
     },
     Function {
         name: "fbm",
@@ -71,6 +83,39 @@ fn sample(name: &str, noise: &FastNoiseLite, point: Dynamic) -> Outcome<f32> {
     })
 }
 
+fn seeded(seed: i32) -> FastNoiseLite {
+    let mut noise = noise(NoiseType::Perlin);
+    noise.set_seed(Some(seed));
+    noise
+}
+
+/// With `amplitude` at first 1 / (1 + gain + gain² + …), summed in this order: for each octave,
+/// `sum += noise(point) * amplitude`; then `amplitude *= gain` and `point *= lacunarity`. Octave number i has the seed
+/// 1337 + i. With lacunarity 2 and gain 0.5 it is `fbm(point, octaves)` to the bit.
+fn layered(octaves: &[FastNoiseLite], point: Dynamic, lacunarity: f32, gain: f32) -> Outcome<f32> {
+    let mut operand = match Operand::of(&point) {
+        Some(operand @ (Operand::Vec2(_) | Operand::Vec3(_))) => operand,
+        _ => return Err(refuse("fbm", &[point])),
+    };
+    let (mut total, mut share) = (1.0, gain);
+    for _ in 1..octaves.len() {
+        total += share;
+        share *= gain;
+    }
+    let (mut sum, mut amplitude) = (0.0, 1.0 / total);
+    for noise in octaves {
+        let at = Operand::build(operand.width(), |lane| operand.lane(lane));
+        sum += sample("fbm", noise, at)? * amplitude;
+        amplitude *= gain;
+        operand = match operand {
+            Operand::Vec2(v) => Operand::Vec2(v * lacunarity),
+            Operand::Vec3(v) => Operand::Vec3(v * lacunarity),
+            other => other,
+        };
+    }
+    Ok(sum)
+}
+
 pub(super) fn register(engine: &mut Engine) {
     let value = noise(NoiseType::Value);
     engine
@@ -84,6 +129,26 @@ pub(super) fn register(engine: &mut Engine) {
     });
     let id = cells(CellularReturnType::CellValue);
     engine.register_fn("cell_id", move |point: Dynamic| sample("cell_id", &id, point).map(|n| 0.5 + 0.5 * n));
+    let (nearest, gap) = (cells(CellularReturnType::Distance), cells(CellularReturnType::Distance2Sub));
+    engine.register_fn("worley", move |point: Dynamic| -> Outcome<Vec2> {
+        let first = sample("worley", &nearest, point.clone())? + 1.0;
+        Ok(Vec2::new(first, sample("worley", &gap, point)? + 1.0))
+    });
+    let octave: Vec<FastNoiseLite> = (0..MAX_OCTAVES as i32).map(|i| seeded(1337 + i)).collect();
+    engine.register_fn("fbm", move |point: Dynamic, octaves: i64, lacunarity: Dynamic, gain: Dynamic| {
+        let (lacunarity, gain) = (number("fbm", &lacunarity)?, number("fbm", &gain)?);
+        let refused = |what: &str| -> Outcome<f32> { Err(Fault::new(format!("`fbm` takes {what}")).into()) };
+        if !(1..=MAX_OCTAVES).contains(&octaves) {
+            return refused(&format!("1 to {MAX_OCTAVES} octaves, not {octaves}"));
+        }
+        if !(1.0..=4.0).contains(&lacunarity) {
+            return refused(&format!("a lacunarity of 1 to 4, not {lacunarity}"));
+        }
+        if !(0.0..=1.0).contains(&gain) {
+            return refused(&format!("a gain of 0 to 1, not {gain}"));
+        }
+        layered(&octave[..octaves as usize], point, lacunarity, gain)
+    });
     engine.register_fn("fbm", |point: Dynamic, octaves: i64| {
         if !(1..=MAX_OCTAVES).contains(&octaves) {
             return Err(Fault::new(format!("`fbm` takes 1 to {MAX_OCTAVES} octaves, not {octaves}")).into());

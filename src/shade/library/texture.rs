@@ -1,14 +1,17 @@
 //! Textures, as scripts hold them.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use rhai::{Dynamic, Engine};
+use rhai::{Dynamic, Engine, ImmutableString};
 
 use super::Function;
 use super::hit::Hit;
 use super::operand::{Outcome, refuse};
 use crate::math::{Vec2, Vec4};
+use crate::scene::ids::TextureId;
 use crate::scene::texture::{Texture, TextureRef};
+use crate::shade::fault::Fault;
 
 pub(super) const FUNCTIONS: &[Function] = &[
     Function {
@@ -20,6 +23,12 @@ pub(super) const FUNCTIONS: &[Function] = &[
         name: "texture",
         form: "texture(map, uv)",
         about: "the texture's linear colour and alpha at a place, (0, 0) being the image's top left",
+    },
+    Function {
+        name: "texture",
+        form: "texture(\"file.png\", uv, wrap, color)",
+        about: "the same of an image beside the script; wrap is \"repeat\" (default), \"mirror\" or \"clamp\", color is \
+                \"srgb\" (default) or \"linear\"; all but uv must be written out as texts",
     },
 ];
 
@@ -37,7 +46,42 @@ impl TextureHandle {
     }
 }
 
-pub(super) fn register(engine: &mut Engine) {
+const NAME: &str = "texture:";
+
+/// What stands in a linked script for the path of an image.
+pub(in crate::shade) fn texture_name(id: TextureId) -> String {
+    format!("{NAME}{}", id.0)
+}
+
+/// The texture that a text in a linked script stands for.
+pub(in crate::shade) fn texture_of(text: &str) -> Option<TextureId> {
+    text.strip_prefix(NAME)?.parse().ok().map(TextureId)
+}
+
+/// The fault of a path that is not written out, and so was not loaded.
+pub(in crate::shade) fn unwritten_path() -> Fault {
+    Fault::new("the path of an image must be written out as a text where it is looked up")
+        .hint("write: texture(\"grain.png\", hit.uv)")
+}
+
+pub(super) fn register(engine: &mut Engine, textures: &[Arc<Texture>]) {
+    let named: BTreeMap<String, Arc<Texture>> = textures
+        .iter()
+        .enumerate()
+        .map(|(index, texture)| (texture_name(TextureId::from_index(index)), Arc::clone(texture)))
+        .collect();
+    let named = Arc::new(named);
+    let look_up = move |name: &ImmutableString, uv: Vec2| -> Outcome<Vec4> {
+        let texture = named.get(name.as_str()).ok_or_else(unwritten_path)?;
+        Ok(texture.sample(uv))
+    };
+    let with_options = look_up.clone();
+    let with_wrap = look_up.clone();
+    engine.register_fn("texture", move |name: ImmutableString, uv: Vec2| look_up(&name, uv));
+    engine.register_fn("texture", move |name: ImmutableString, uv: Vec2, _: ImmutableString| with_wrap(&name, uv));
+    engine.register_fn("texture", move |name: ImmutableString, uv: Vec2, _: ImmutableString, _: ImmutableString| {
+        with_options(&name, uv)
+    });
     engine.register_type_with_name::<TextureHandle>("texture");
     engine.register_fn("==", |a: TextureHandle, b: TextureHandle| a.place == b.place);
     engine.register_fn("!=", |a: TextureHandle, b: TextureHandle| a.place != b.place);

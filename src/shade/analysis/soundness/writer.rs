@@ -305,7 +305,24 @@ impl Writer<'_> {
             };
         }
         let d = depth - 1;
-        match self.choose(33) {
+        match self.choose(36) {
+            33 | 34 => {
+                let (v, x, y) = (self.expression(Type::Vector, d), self.expression(Type::Float, d), self.float(0));
+                match self.choose(12) {
+                    0 => format!("stripes({x}, {y})"),
+                    1 => format!("stripes({x}, {y}, 0.1)"),
+                    2 => format!("checker({v}, {x})"),
+                    3 => format!("dots({v}.xy, {x})"),
+                    4 => format!("dots({v}.xy, {x}, {y})"),
+                    5 => format!("hatch({v}.xy, {x}, {y})"),
+                    6 => format!("cross_hatch({v}.xy, {x}, {y})"),
+                    7 => format!("rotate({v}.xy, {x}).y"),
+                    8 => format!("worley({v}).y"),
+                    9 => format!("fbm({v}, 3, 2.5, 0.4)"),
+                    10 => format!("temperature({x}).y"),
+                    _ => format!("mix_oklab({v}, hsl({x}, saturate({y}), 0.5), {y}).z"),
+                }
+            }
             28 if self.has_hit => {
                 let default = self.float(0);
                 format!("hit.attribute(\"wear\", to_float({default}))")
