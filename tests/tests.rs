@@ -12,6 +12,7 @@ mod plan;
 mod shade;
 // ... rays, lines and pixels, ...
 mod film;
+mod footprint;
 mod light;
 mod line;
 mod trace;

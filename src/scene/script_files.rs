@@ -8,7 +8,7 @@
 
 use std::collections::BTreeSet;
 use std::path::{Component, Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use super::SceneBuilder;
 use super::ids::TextureId;
@@ -133,7 +133,13 @@ fn texture(
             image
         }
     };
-    let texture = Texture { name: request.path.clone(), image, wrap: [wrap; 2], filter: TextureFilter::Linear };
+    let texture = Texture {
+        name: request.path.clone(),
+        image,
+        wrap: [wrap; 2],
+        filter: TextureFilter::Linear,
+        levels: OnceLock::new(),
+    };
     let id = scene.add_texture(texture);
     let key = TextureKey {
         script: script.name.clone(),

@@ -41,6 +41,8 @@ pub struct HitBatch {
     pub front_facing: Vec<bool>,
     pub pixels_per_unit: Vec<f32>,
     pub curvature: Vec<f32>,
+    pub footprint: Vec<f32>,
+    pub uv_footprint: Vec<f32>,
     /// Each hit's set among `attributes`. Empty also where no hit of the material has an attribute that its shader asks
     /// for: all get the default.
     pub attribute_set: Vec<u32>,
@@ -78,6 +80,8 @@ impl HitBatch {
             front_facing,
             pixels_per_unit,
             curvature,
+            footprint,
+            uv_footprint,
             attribute_set,
             attributes: _,
             lights,
@@ -103,6 +107,8 @@ impl HitBatch {
         front_facing.clear();
         pixels_per_unit.clear();
         curvature.clear();
+        footprint.clear();
+        uv_footprint.clear();
         attribute_set.clear();
         lights.clear();
     }

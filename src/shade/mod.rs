@@ -23,6 +23,7 @@ pub mod names;
 mod output;
 pub mod params;
 pub mod program;
+pub mod reference;
 pub mod requests;
 mod script;
 

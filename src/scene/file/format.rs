@@ -428,6 +428,8 @@ pub(super) enum TextureFilter {
     /// Bilinear.
     #[default]
     Linear,
+    /// Bilinear in smaller images that fit the width of a pixel: calm where the texture is far away.
+    Mipmap,
 }
 
 /// A model or a built-in shape with a place in the world.

@@ -231,10 +231,11 @@ fn texture(record: &Map<String, Value>, folder: &Path) -> Result<TextureFile, St
             ("wrap", Some("clamp"), _) => wrap = Wrap::Clamp,
             ("filter", Some("nearest"), _) => filter = TextureFilter::Nearest,
             ("filter", Some("linear"), _) => filter = TextureFilter::Linear,
+            ("filter", Some("mipmap"), _) => filter = TextureFilter::Mipmap,
             ("texture", ..) => return Err("texture: expected the path of an image".into()),
             ("srgb", ..) => return Err("srgb: expected true or false".into()),
             ("wrap", ..) => return Err("wrap: expected \"repeat\", \"mirror\" or \"clamp\"".into()),
-            ("filter", ..) => return Err("filter: expected \"nearest\" or \"linear\"".into()),
+            ("filter", ..) => return Err("filter: expected \"nearest\", \"linear\" or \"mipmap\"".into()),
             _ => return Err(format!("{key}: {}", unknown(key, &["texture", "srgb", "wrap", "filter"]))),
         }
     }

@@ -13,6 +13,7 @@ use super::interval::Interval;
 use super::operators;
 use super::value::{Abstract, Shape, Vector};
 use super::walk::{Flow, Walker};
+use crate::shade::names::InputSet;
 
 /// Functions of the script engine that change their first argument.
 const MUTATING: [&str; 38] = [
@@ -81,9 +82,10 @@ impl Walker<'_> {
             [text, _, ..] if name == "texture" && matches!(text.shape, Shape::Text(_)) => {
                 self.named_texture(arguments, position)?
             }
-            [texture, uv] if name == "texture" => {
+            [texture, uv, width @ ..] if name == "texture" && width.len() < 2 => {
                 let shape = self.texture_bounds(&texture.shape);
-                let inputs = self.escape(texture) | self.escape(uv);
+                let width: InputSet = width.iter().map(|width| self.escape(width)).collect();
+                let inputs = self.escape(texture) | self.escape(uv) | width;
                 self.value(shape, inputs)
             }
             [a, b] if operators::is_binary(name) => self.binary(name, a, b),

@@ -11,7 +11,7 @@ use super::interval::Interval;
 use super::value::{Abstract, Field, NOWHERE, Record, Shape, Vector};
 use super::walk::{Flow, Stop, Walker};
 use crate::math::{Affine2, Vec2, Vec3, Vec4};
-use crate::scene::texture::TextureRef;
+use crate::scene::texture::{TextureFilter, TextureRef};
 use crate::shade::fault::Fault;
 use crate::shade::library::{ATTRIBUTE_TYPES, mistyped_attribute, texture_of, unwritten_path};
 use crate::shade::names::InputSet;
@@ -47,7 +47,8 @@ pub(super) fn shape(input: InputSet) -> Shape {
         InputSet::POLYGON_ID | InputSet::LIGHT_COUNT => id(0),
         // Weights of a point that rounding has put just outside of the triangle.
         InputSet::BARYCENTRIC => vector(Interval::new(-0.001, 1.001), 3),
-        InputSet::DISTANCE | InputSet::DEPTH | InputSet::PIXELS_PER_UNIT => Shape::Float(positive),
+        InputSet::DISTANCE | InputSet::DEPTH => Shape::Float(positive),
+        input if InputSet::CONE.contains(input) => Shape::Float(positive),
         InputSet::PATH_KIND => Shape::Text(None),
         InputSet::FRONT_FACING => Shape::Bool(None),
         InputSet::IRRADIANCE => vector(positive, 3),
@@ -144,6 +145,13 @@ impl Walker<'_> {
             Shape::Texture(Some(TextureRef { uv_set: 0, .. })) => InputSet::UV,
             Shape::Texture(Some(_)) => InputSet::MORE_UVS,
             _ => InputSet::UV | InputSet::MORE_UVS,
+        };
+        let read = match &texture.shape {
+            Shape::Texture(Some(place)) => match self.textures.get(place.texture.index()) {
+                Some(texture) if texture.filter == TextureFilter::Mipmap => read | InputSet::UV_FOOTPRINT,
+                _ => read,
+            },
+            _ => read | InputSet::UV_FOOTPRINT,
         };
         self.inputs |= read;
         let shape = self.texture_bounds(&texture.shape);

@@ -11,63 +11,111 @@ use super::vectors::gather;
 use crate::math::{Vec3, linear_from_srgb, luminance, portable, srgb_from_linear};
 
 pub(super) const FUNCTIONS: &[Function] = &[
-    Function { name: "rgb", form: "rgb(r, g, b)", about: "a linear colour, the same as vec3" },
-    Function { name: "gray", form: "gray(x)", about: "rgb(x, x, x)" },
     Function {
-        name: "srgb", form: "srgb(r, g, b)", about: "a linear colour from sRGB values 0 … 1; also srgb(color)"
+        name: "rgb",
+        form: "rgb(r, g, b)",
+        about: "a linear colour, the same as vec3",
+        types: "numbers → colour",
+        example: "rgb(0.9, 0.5, 0.2)",
     },
-    Function { name: "hsv", form: "hsv(hue, saturation, value)", about: "a colour; the hue is in turns and wraps" },
+    Function {
+        name: "gray",
+        form: "gray(x)",
+        about: "rgb(x, x, x)",
+        types: "number → colour",
+        example: "gray(0.5)",
+    },
+    Function {
+        name: "srgb",
+        form: "srgb(r, g, b)",
+        about: "a linear colour from sRGB values 0 … 1; also srgb(color)",
+        types: "numbers or a colour, 0 … 1 → colour, 0 … 1",
+        example: "srgb(1.0, 0.5, 0.0)",
+    },
+    Function {
+        name: "hsv",
+        form: "hsv(hue, saturation, value)",
+        about: "a colour; the hue is in turns and wraps",
+        types: "numbers: turns, 0 … 1, 0 or more → colour",
+        example: "hsv(0.33, 1.0, 0.8)",
+    },
     Function {
         name: "hsv_from_rgb",
         form: "hsv_from_rgb(color)",
         about: "vec3 of hue in turns (0 … 1), saturation, value",
+        types: "colour → vec3",
+        example: "hsv_from_rgb(rgb(0.2, 0.5, 0.9)).x",
     },
     Function {
         name: "hsl",
         form: "hsl(hue, saturation, lightness)",
         about: "a colour; the hue is in turns and wraps, lightness 1 is white",
+        types: "numbers: turns, 0 … 1, 0 … 1 → colour, 0 … 1",
+        example: "hsl(0.6, 0.7, 0.5)",
     },
     Function {
         name: "hsl_from_rgb",
         form: "hsl_from_rgb(color)",
         about: "vec3 of hue in turns (0 … 1), saturation, lightness",
+        types: "colour → vec3",
+        example: "hsl_from_rgb(rgb(0.2, 0.5, 0.9)).z",
     },
     Function {
         name: "srgb_from_rgb",
         form: "srgb_from_rgb(color)",
         about: "the sRGB values 0 … 1 of a linear colour; what is outside 0 … 1 is clamped",
+        types: "colour → vec3, 0 … 1",
+        example: "srgb_from_rgb(rgb(0.2, 0.5, 0.9))",
     },
     Function {
         name: "oklab",
         form: "oklab(lightness, a, b)",
         about: "a linear colour from OKLab, in which equal steps look equal; also oklab(lab)",
+        types: "numbers or a vec3 → colour",
+        example: "oklab(0.7, 0.1, -0.1)",
     },
     Function {
         name: "oklab_from_rgb",
         form: "oklab_from_rgb(color)",
         about: "vec3 of lightness (0 … 1), a (green to red) and b (blue to yellow), both about −0.4 … 0.4",
+        types: "colour → vec3",
+        example: "oklab_from_rgb(rgb(0.2, 0.5, 0.9)).x",
     },
     Function {
         name: "oklch",
         form: "oklch(lightness, chroma, hue)",
         about: "a linear colour from OKLab's lightness, chroma (0 … 0.4) and hue in turns; also oklch(lch)",
+        types: "numbers or a vec3 → colour",
+        example: "oklch(0.7, 0.12, 0.25)",
     },
     Function {
         name: "oklch_from_rgb",
         form: "oklch_from_rgb(color)",
         about: "vec3 of lightness, chroma and hue in turns (0 … 1); the hue of grays is 0",
+        types: "colour → vec3",
+        example: "oklch_from_rgb(rgb(0.2, 0.5, 0.9)).z",
     },
     Function {
         name: "mix_oklab",
         form: "mix_oklab(a, b, t)",
         about: "two linear colours mixed in OKLab: even to the eye, and no dull middle",
+        types: "colour, colour, number 0 … 1 → colour",
+        example: "mix_oklab(rgb(0, 0, 1), rgb(1, 1, 0), 0.5)",
     },
     Function {
         name: "temperature",
         form: "temperature(kelvin)",
         about: "the colour of a glowing body of 1667 … 25000 K, its brightest channel 1; 6500 is about white",
+        types: "number → colour, 0 … 1",
+        example: "temperature(2700)",
     },
-    Function { name: "luminance", form: "luminance(color)", about: "r·0.2126 + g·0.7152 + b·0.0722" },
+    Function {
+        name: "luminance",
+        form: "luminance(color)",
+        about: "r·0.2126 + g·0.7152 + b·0.0722",
+        types: "colour → number",
+        example: "luminance(hit.irradiance)",
+    },
 ];
 
 /// For `n` = 5, 3 and 1 (red, green, blue), with `k = mod(n + hue * 6, 6)`:

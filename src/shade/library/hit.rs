@@ -17,14 +17,18 @@ use crate::shade::names::InputSet;
 use crate::shade::params::Value;
 
 pub(super) const FUNCTIONS: &[Function] = &[Function {
-    name: "light",
-    form: "hit.light(i)",
-    about: "light number 0 … hit.light_count − 1, with its direction, radiance and visibility",
-}, Function {
-    name: "attribute",
-    form: "hit.attribute(\"name\", default)",
-    about: "a value of the object's or material's attributes, of the default's type; the default where there is none",
-}];
+        name: "light",
+        form: "hit.light(i)",
+        about: "light number 0 … hit.light_count − 1, with its direction, radiance and visibility",
+        types: "int → light: `direction` (unit vector towards it), `radiance` (colour), `visibility` (0 … 1)",
+        example: "if hit.light_count > 0 { hit.light(0).visibility } else { 0.0 }",
+    }, Function {
+        name: "attribute",
+        form: "hit.attribute(\"name\", default)",
+        about: "a value of the object's or material's attributes, of the default's type; the default where there is none",
+        types: "text, any of number, vector, text, true or false → the default's type",
+        example: "hit.attribute(\"wear\", 0.0)",
+    }];
 
 /// A row of a batch: the batch is shared, so that a hit costs one small allocation whatever it reads.
 #[derive(Clone, Debug)]
@@ -83,6 +87,11 @@ impl Hit {
         }))
     }
 
+    /// How far uv moves across the pixel.
+    pub(super) fn uv_footprint(&self) -> Outcome<f32> {
+        self.read("uv_footprint", &self.batch.uv_footprint)
+    }
+
     /// The texture coordinates of a set; (0, 0) where the mesh lacks the set.
     pub(super) fn uv_set(&self, set: u32) -> Outcome<Vec2> {
         match set.checked_sub(1) {
@@ -136,7 +145,9 @@ pub(super) fn register(engine: &mut Engine) {
         depth,
         front_facing,
         pixels_per_unit,
-        curvature
+        curvature,
+        footprint,
+        uv_footprint
     );
     let id = |hit: &Hit, name: &str, column: &[u32]| hit.read(name, column).map(i64::from);
     engine.register_get("object_id", move |hit: &mut Hit| id(hit, "object_id", &hit.batch.object_id));

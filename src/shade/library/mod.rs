@@ -42,6 +42,10 @@ pub struct Function {
     pub form: &'static str,
     /// What it gives.
     pub about: &'static str,
+    /// Types and ranges of what it takes, `→`, type and range of what it gives.
+    pub types: &'static str,
+    /// An expression in a `surface(hit, p)` that uses it; a number, a vec3, an int, or true or false.
+    pub example: &'static str,
 }
 
 /// All functions of the library, by subject.

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use super::super::document::Node;
 use super::super::format;
@@ -146,8 +146,9 @@ impl Resolver<'_> {
         let filter = match filter {
             format::TextureFilter::Nearest => TextureFilter::Nearest,
             format::TextureFilter::Linear => TextureFilter::Linear,
+            format::TextureFilter::Mipmap => TextureFilter::Mipmap,
         };
-        let texture = Texture { name: written.to_owned(), image, wrap: [wrap; 2], filter };
+        let texture = Texture { name: written.to_owned(), image, wrap: [wrap; 2], filter, levels: OnceLock::new() };
         Some(TextureRef { texture: self.scene.add_texture(texture), uv_set: 0, transform: Affine2::IDENTITY })
     }
 

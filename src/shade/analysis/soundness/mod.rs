@@ -6,7 +6,7 @@ mod writer;
 
 use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet};
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
@@ -28,7 +28,7 @@ use crate::shade::params::{Params, Value};
 use crate::shade::script::Program;
 
 /// The columns that the scripts read.
-const COLUMNS: [InputSet; 12] = [
+const COLUMNS: [InputSet; 14] = [
     InputSet::POSITION,
     InputSet::NORMAL,
     InputSet::UV,
@@ -41,6 +41,8 @@ const COLUMNS: [InputSet; 12] = [
     InputSet::PATH_KIND,
     InputSet::LIGHT,
     InputSet::ATTRIBUTE,
+    InputSet::FOOTPRINT,
+    InputSet::UV_FOOTPRINT,
 ];
 
 /// A hit with one column of another.
@@ -58,6 +60,8 @@ fn with_column(hit: &HitBatch, column: InputSet, other: &HitBatch) -> HitBatch {
         InputSet::FRONT_FACING => hit.front_facing.clone_from(&other.front_facing),
         InputSet::PATH_KIND => hit.path_kind.clone_from(&other.path_kind),
         InputSet::LIGHT => hit.lights.clone_from(&other.lights),
+        InputSet::FOOTPRINT => hit.footprint.clone_from(&other.footprint),
+        InputSet::UV_FOOTPRINT => hit.uv_footprint.clone_from(&other.uv_footprint),
         InputSet::ATTRIBUTE => hit.attribute_set.clone_from(&other.attribute_set),
         _ => unreachable!("not in COLUMNS"),
     }
@@ -91,7 +95,7 @@ fn hit() -> impl Strategy<Value = HitBatch> {
     let floats = (number(LIMIT), number(LIMIT), number(LIMIT));
     let ids = (prop_oneof![1..6_u32, Just(u32::MAX)], 0..6_u32);
     let kinds = [PathKind::Camera, PathKind::Reflection, PathKind::Refraction, PathKind::Shadow];
-    let others = (any::<bool>(), prop::sample::select(kinds.to_vec()), [light(), light()], 0..3_u32);
+    let others = (any::<bool>(), prop::sample::select(kinds.to_vec()), [light(), light()], 0..3_u32, number(LIMIT));
     (vectors, floats, ids, others).prop_map(|(vectors, floats, ids, others)| HitBatch {
         len: 1,
         position: vec![vectors.0],
@@ -107,6 +111,8 @@ fn hit() -> impl Strategy<Value = HitBatch> {
         lights: others.2.to_vec(),
         light_count: 2,
         attribute_set: vec![others.3],
+        footprint: vec![others.4.abs()],
+        uv_footprint: vec![(others.4 * 0.5).abs()],
         attributes: Arc::new(attribute_sets()),
         ..HitBatch::default()
     })
@@ -134,8 +140,10 @@ impl Bench {
     fn new() -> Self {
         let pixels = Pixels::Rgba8 { data: vec![[51, 102, 0, 255], [102, 204, 0, 255]], srgb: false };
         let image = Arc::new(Image { width: 2, height: 1, pixels });
-        let texture = Texture { name: "two".into(), image, wrap: [Wrap::Repeat; 2], filter: TextureFilter::Linear };
-        let textures = vec![Arc::new(texture)];
+        let texture = Texture { name: "two".into(), image, wrap: [Wrap::Repeat; 2], filter: TextureFilter::Linear, levels: OnceLock::new() };
+        let wide = Texture { filter: TextureFilter::Mipmap, ..texture.clone() };
+        let textures = vec![Arc::new(texture), Arc::new(wide)];
+        let mip = TextureRef { texture: TextureId::from_index(1), uv_set: 0, transform: Affine2::IDENTITY };
         let map = TextureRef { texture: TextureId::from_index(0), uv_set: 0, transform: Affine2::IDENTITY };
         let values = [
             ("half", Value::Float(0.5)),
@@ -143,6 +151,7 @@ impl Bench {
             ("on", Value::Bool(true)),
             ("none", Value::Unit),
             ("map", Value::Texture(map)),
+            ("mip", Value::Texture(mip)),
         ];
         let values: BTreeMap<String, Value> = values.map(|(name, value)| (name.to_owned(), value)).into();
         let names: BTreeSet<String> = values.keys().cloned().collect();

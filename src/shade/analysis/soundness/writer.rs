@@ -371,7 +371,9 @@ impl Writer<'_> {
             19 => format!("({} * {})", self.expression(Type::Int, d), self.float(0)),
             20 if self.has_hit => format!("hit.light({}).visibility", self.choose(2)),
             21 if self.has_hit => {
-                ["native(hit)", "hit.texture(p.map).g", "facing(hit)"][usize::from(self.choose(3))].into()
+                ["native(hit)", "hit.texture(p.map).g", "facing(hit)", "hit.texture(p.mip).r", "hit.footprint"]
+                    [usize::from(self.choose(5))]
+                .into()
             }
             23 => format!("fbm({}, 2)", self.expression(Type::Vector, d)),
             24 => format!(
