@@ -214,6 +214,16 @@ pub const OUTPUTS: [Output; 15] = [
     Output { name: "color", output: OutputSet::COLOR, kind: "colour or number", unit: "linear RGB radiance", range: "", default: "lighting decides", about: "final colour; lighting is bypassed" },
 ];
 
+/// What a script gives for an output.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum OutputForm {
+    Number,
+    /// A vec3, or a number for all three channels.
+    Color,
+    Vector,
+    Int,
+}
+
 /// What the key of an extra output starts with.
 pub const AOV_PREFIX: &str = "aov_";
 
@@ -227,6 +237,16 @@ impl OutputSet {
     #[must_use]
     pub fn spelled(name: &str) -> Option<Self> {
         Self::named().find(|(known, _)| *known == name).map(|(_, output)| output)
+    }
+
+    /// What a script gives for one output.
+    pub(super) fn form(self) -> OutputForm {
+        match self {
+            Self::BASE_COLOR | Self::EMISSION | Self::FEATURE | Self::LINE_COLOR | Self::COLOR => OutputForm::Color,
+            Self::NORMAL => OutputForm::Vector,
+            Self::PRIORITY => OutputForm::Int,
+            _ => OutputForm::Number,
+        }
     }
 
     /// What the lighting of a hit needs.
@@ -257,6 +277,19 @@ pub enum PathKind {
 }
 
 impl PathKind {
+    /// All kinds.
+    pub const ALL: [Self; 4] = [Self::Camera, Self::Reflection, Self::Refraction, Self::Shadow];
+
+    /// Its place in [`Self::ALL`].
+    pub(super) fn place(self) -> i64 {
+        match self {
+            Self::Camera => 0,
+            Self::Reflection => 1,
+            Self::Refraction => 2,
+            Self::Shadow => 3,
+        }
+    }
+
     /// As scripts see it.
     #[must_use]
     pub fn name(self) -> &'static str {

@@ -15,7 +15,7 @@ use super::triangle::Ray;
 use super::world::World;
 use crate::clock::CpuClock;
 use crate::math::Vec3;
-use crate::plan::Plan;
+use crate::plan::{Plan, marker};
 use crate::sample::position::SamplePositions;
 use crate::sample::{PixelRect, SampleBuffer, SampleBufferBuilder, SampleColor};
 use crate::scene::Scene;
@@ -132,11 +132,7 @@ impl<'a> TileTracer<'a> {
             transparent: settings.background == Background::Transparent,
             cone: Cone { width, spread: angle },
             follows_cones: plan.materials.iter().any(|material| material.inputs.intersects(InputSet::CONE)),
-            marker: {
-                let color = if plan.color { OutputSet::COLOR } else { OutputSet::empty() };
-                let width = if plan.lines.is_some() { OutputSet::LINE_WIDTH } else { OutputSet::empty() };
-                color | width
-            },
+            marker: marker(plan.color, plan.lines.is_some()),
         }
     }
 

@@ -26,7 +26,7 @@ fn try_shade(body: &str, attributes: &[(&str, Attribute)]) -> Result<Vec3, Strin
     let (shaders, _) = Shaders::compile(&scene, &Host::new()).map_err(|faults| rendered(&faults))?;
     let set = scene.attributes().of(object, MaterialId(0));
     let mut hits = batch(1);
-    if shaders.all()[0].needs().contains(tusche::shade::InputSet::ATTRIBUTE) {
+    if shaders.all()[0].needs(OutputSet::all()).contains(tusche::shade::InputSet::ATTRIBUTE) {
         hits.attribute_set = vec![set];
         hits.attributes = Arc::clone(scene.attributes().sets());
     }
@@ -125,7 +125,7 @@ fn attributes_that_nobody_asks_for_change_nothing() {
     let with = scene_from("[[objects]]\nshape = \"sphere\"\nattributes = { wear = 0.5 }\n");
     for scene in [plain, with] {
         let (shaders, _) = Shaders::compile(&scene, &Host::new()).expect("it compiles");
-        assert!(!shaders.all()[0].needs().contains(tusche::shade::InputSet::ATTRIBUTE));
+        assert!(!shaders.all()[0].needs(OutputSet::all()).contains(tusche::shade::InputSet::ATTRIBUTE));
     }
     let faults = load("[[objects]]\nshape = \"sphere\"\nattributes = { wear = [1] }\n").expect_err("one number");
     assert!(rendered(&faults).contains("test.toml:3:23"), "{}", rendered(&faults));

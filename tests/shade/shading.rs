@@ -213,6 +213,6 @@ fn needs_name_the_columns() {
     let shader = shaders.of(MaterialId(0));
     assert_eq!((shader.name(), shader.script()), ("material 0", "first.rhai"));
     if !shader.analysis().complete {
-        assert_eq!(shader.needs(), InputSet::all());
+        assert_eq!(shader.needs(OutputSet::all()), InputSet::all());
     }
 }

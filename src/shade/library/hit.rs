@@ -82,9 +82,7 @@ impl Hit {
 
     fn irradiance(&self) -> Outcome<Vec3> {
         let normal = self.read("normal", &self.batch.normal)?;
-        Ok(self.lights()?.iter().fold(Vec3::ZERO, |sum, light| {
-            sum + light.radiance * light.visibility * max(0.0, dot(normal, light.direction))
-        }))
+        Ok(irradiance(normal, self.lights()?))
     }
 
     /// How far uv moves across the pixel.
@@ -102,6 +100,14 @@ impl Hit {
             },
         }
     }
+}
+
+/// What all lights together give a surface with this normal.
+#[inline(always)]
+pub(in crate::shade) fn irradiance(normal: Vec3, lights: &[LightSample]) -> Vec3 {
+    lights.iter().fold(Vec3::ZERO, |sum, light| {
+        sum + light.radiance * light.visibility * max(0.0, dot(normal, light.direction))
+    })
 }
 
 /// A hit was asked for what its batch does not hold: the analysis missed that the script reads it.

@@ -286,37 +286,44 @@ pub(super) const FUNCTIONS: &[Function] = &[
 pub(in crate::shade) const CONSTANTS: [(&str, f32); 2] = [("PI", PI), ("TAU", TAU)];
 
 /// `b` where `b < a`, else `a`: a NaN in `a` stays.
-pub(super) fn min(a: f32, b: f32) -> f32 {
+#[inline(always)]
+pub(in crate::shade) fn min(a: f32, b: f32) -> f32 {
     if b < a { b } else { a }
 }
 
 /// `b` where `a < b`, else `a`: a NaN in `a` stays.
-pub(super) fn max(a: f32, b: f32) -> f32 {
+#[inline(always)]
+pub(in crate::shade) fn max(a: f32, b: f32) -> f32 {
     if a < b { b } else { a }
 }
 
 /// `min(max(x, low), high)`.
-pub(super) fn clamp(x: f32, low: f32, high: f32) -> f32 {
+#[inline(always)]
+pub(in crate::shade) fn clamp(x: f32, low: f32, high: f32) -> f32 {
     min(max(x, low), high)
 }
 
 /// `clamp(x, 0, 1)`.
-pub(super) fn saturate(x: f32) -> f32 {
+#[inline(always)]
+pub(in crate::shade) fn saturate(x: f32) -> f32 {
     clamp(x, 0.0, 1.0)
 }
 
 /// `a * (1 - t) + b * t`: exactly `a` at 0 and `b` at 1.
-pub(super) fn mix(a: f32, b: f32, t: f32) -> f32 {
+#[inline(always)]
+pub(in crate::shade) fn mix(a: f32, b: f32, t: f32) -> f32 {
     a * (1.0 - t) + b * t
 }
 
 /// 0 where `x < edge`, else 1.
-pub(super) fn step(edge: f32, x: f32) -> f32 {
+#[inline(always)]
+pub(in crate::shade) fn step(edge: f32, x: f32) -> f32 {
     if x < edge { 0.0 } else { 1.0 }
 }
 
 /// With `t = saturate((x - low) / (high - low))`: `t * t * (3 - 2 * t)`. With `low = high` it is `step(low, x)`.
-pub(super) fn smoothstep(low: f32, high: f32, x: f32) -> f32 {
+#[inline(always)]
+pub(in crate::shade) fn smoothstep(low: f32, high: f32, x: f32) -> f32 {
     if low == high {
         return step(low, x);
     }
@@ -330,7 +337,8 @@ pub(super) fn remap(x: f32, from_low: f32, from_high: f32, to_low: f32, to_high:
 }
 
 /// -1, 0 or 1; a NaN stays.
-pub(super) fn sign(x: f32) -> f32 {
+#[inline(always)]
+pub(in crate::shade) fn sign(x: f32) -> f32 {
     if x > 0.0 {
         1.0
     } else if x < 0.0 {
@@ -341,13 +349,31 @@ pub(super) fn sign(x: f32) -> f32 {
 }
 
 /// `x - floor(x)`.
-pub(super) fn fract(x: f32) -> f32 {
+#[inline(always)]
+pub(in crate::shade) fn fract(x: f32) -> f32 {
     x - x.floor()
 }
 
 /// `x - y * floor(x / y)`.
-pub(super) fn floored_mod(x: f32, y: f32) -> f32 {
+#[inline(always)]
+pub(in crate::shade) fn floored_mod(x: f32, y: f32) -> f32 {
     x - y * (x / y).floor()
+}
+
+/// `x - y * floor(x / y)` in whole numbers; `None` where that has no value.
+#[inline(always)]
+pub(in crate::shade) fn floored_mod_ints(x: i64, y: i64) -> Option<i64> {
+    let rest = x.checked_rem(y)?;
+    Some(if rest != 0 && (rest < 0) != (y < 0) { rest + y } else { rest })
+}
+
+/// The whole part; `None` where that does not fit an int.
+#[inline(always)]
+pub(in crate::shade) fn to_int(x: f32) -> Option<i64> {
+    // 2⁶³ as a float; every float below it fits.
+    const END: f32 = 9_223_372_036_854_775_808.0;
+    #[expect(clippy::cast_possible_truncation, reason = "checked to fit")]
+    (-END..END).contains(&x).then_some(x as i64)
 }
 
 /// `ln(x) / ln(base)`.
@@ -407,8 +433,7 @@ fn register_ints(engine: &mut Engine) {
         x.checked_abs().ok_or_else(|| Fault::new(format!("abs({x}) does not fit an int")).into())
     });
     engine.register_fn("mod", |x: i64, y: i64| -> Outcome<i64> {
-        let rest = x.checked_rem(y).ok_or_else(|| Fault::new(format!("mod({x}, {y}) has no value")))?;
-        Ok(if rest != 0 && (rest < 0) != (y < 0) { rest + y } else { rest })
+        floored_mod_ints(x, y).ok_or_else(|| Fault::new(format!("mod({x}, {y}) has no value")).into())
     });
 }
 
@@ -420,13 +445,11 @@ fn register_conversions(engine: &mut Engine) {
         _ => Err(refuse("to_float", &[x])),
     });
     engine.register_fn("to_int", |x: Dynamic| -> Outcome<i64> {
-        // 2⁶³ as a float; every float below it fits.
-        const END: f32 = 9_223_372_036_854_775_808.0;
         match Operand::of(&x) {
             Some(Operand::Int(i)) => Ok(i),
-            #[expect(clippy::cast_possible_truncation, reason = "checked to fit")]
-            Some(Operand::Float(f)) if (-END..END).contains(&f) => Ok(f as i64),
-            Some(Operand::Float(f)) => Err(Fault::new(format!("to_int({f}) does not fit an int")).into()),
+            Some(Operand::Float(f)) => {
+                to_int(f).ok_or_else(|| Fault::new(format!("to_int({f}) does not fit an int")).into())
+            }
             _ => Err(refuse("to_int", &[x])),
         }
     });

@@ -6,15 +6,16 @@
 //!
 //! Wherever a number is expected, a script may write `1` or `1.0`; an int counts as the nearest float.
 
-mod color;
+pub(in crate::shade) mod color;
 mod compare;
-mod hash;
-mod hit;
-mod math;
-mod noise;
+pub(in crate::shade) mod fractal;
+pub(in crate::shade) mod hash;
+pub(in crate::shade) mod hit;
+pub(in crate::shade) mod math;
+pub(in crate::shade) mod noise;
 mod operand;
 mod parameters;
-mod pattern;
+pub(in crate::shade) mod pattern;
 mod ramp;
 mod swizzle;
 mod texture;
@@ -56,6 +57,7 @@ pub fn functions() -> impl Iterator<Item = Function> + Clone {
         color::FUNCTIONS,
         ramp::FUNCTIONS,
         noise::FUNCTIONS,
+        fractal::FUNCTIONS,
         pattern::FUNCTIONS,
         hash::FUNCTIONS,
         texture::FUNCTIONS,
@@ -76,6 +78,7 @@ pub(super) fn register(engine: &mut Engine, names: &BTreeSet<String>, textures: 
     color::register(engine);
     ramp::register(engine);
     noise::register(engine);
+    fractal::register(engine);
     pattern::register(engine);
     hash::register(engine);
     texture::register(engine, textures);
