@@ -133,6 +133,7 @@ impl Plan {
             position: layers.contains(&Layer::Position),
             aovs,
             max_width: tests.max_width,
+            declared_widths: shaders.iter().map(|shader| shader.params().max_line_width()).collect(),
             materials: materials.len(),
         };
         let shadow_rays = materials.iter().any(|m| m.used && m.lights) && scene.lights().iter().any(|l| l.shadows);
@@ -251,8 +252,9 @@ fn plan_lines(scene: &Scene, shaders: &Shaders, layers: &[Layer], used: &[bool])
         .enumerate()
         .filter(|(_, draws)| **draws)
         .map(|(index, _)| {
-            let fact = shaders.of(MaterialId::from_index(index)).analysis().output(OutputSet::LINE_WIDTH);
-            bounds(fact, settings.width).map_or(settings.max_width, |b| b[1]).min(settings.max_width)
+            let shader = shaders.of(MaterialId::from_index(index));
+            let found = bounds(shader.analysis().output(OutputSet::LINE_WIDTH), settings.width).map(|b| b[1]);
+            found.into_iter().chain(shader.params().max_line_width()).fold(settings.max_width, f32::min)
         })
         .fold(0.0, f32::max);
     if widest <= 0.0 {

@@ -10,6 +10,7 @@ mod scene_file;
 mod analysis;
 mod plan;
 mod shade;
+mod shader_check;
 // ... rays, lines and pixels, ...
 mod film;
 mod footprint;

@@ -11,6 +11,7 @@ use super::host::{MAX_ARRAY, MAX_CALL_DEPTH, MAX_EXPRESSION_DEPTH, MAX_MAP, MAX_
 use super::closures;
 use super::library;
 use super::script::Functions;
+use super::names::{AOV_PREFIX, OutputSet};
 use crate::diag::{Diagnostic, Source, Span, nearest};
 
 /// An error raised by a library function; the interpreter adds the place of the call.
@@ -65,13 +66,20 @@ pub(super) fn span(source: &Arc<Source>, position: Position) -> Span {
     }
 }
 
+/// What the message of a script begins with that ran out of operations.
+pub(super) const OUT_OF_OPERATIONS: &str = "the script did not finish within";
+
 /// An error of the parser.
 pub(super) fn from_parse_error(error: &ParseError, source: &Arc<Source>) -> Diagnostic {
     use ParseErrorType as Kind;
     let fault = match error.err_type() {
         Kind::UnexpectedEOF => Fault::new("the script ends too early").hint("is a closing `}` or `)` missing?"),
         Kind::BadInput(LexError::ImproperSymbol(_, told)) if !told.is_empty() => Fault::new(lower_first(told)),
-        Kind::VariableUndefined(name) => unknown_variable(name),
+        Kind::BadInput(LexError::UnterminatedString) => {
+            Fault::new("this text has no end").hint("is a closing `\"` missing?")
+        }
+        Kind::VariableUndefined(name) => undefined_variable(name, source, error.position()),
+        Kind::Reserved(word) => Fault::new(format!("`{word}` is a reserved word")).hint("give it another name"),
         Kind::ModuleUndefined(name) => Fault::new(format!("there is no module `{name}`")),
         Kind::ExprTooDeep => Fault::new(format!("this is nested more than {MAX_EXPRESSION_DEPTH} levels deep"))
             .hint("give parts of it a name with `let`, or put them into functions"),
@@ -79,7 +87,13 @@ pub(super) fn from_parse_error(error: &ParseError, source: &Arc<Source>) -> Diag
         Kind::FnDuplicatedDefinition(name, count) => {
             Fault::new(format!("there are two functions `{name}` with {count} parameters"))
         }
+        Kind::MissingToken(token, place) if token == ":" && place.contains("object map") => {
+            let key = place.split('\'').nth(1).unwrap_or_default();
+            Fault::new(format!("expected `:` and a value after the key `{key}` of this record"))
+                .hint("a record is written #{ base_color: rgb(0.8, 0.2, 0.1), line_width: 2.0 }")
+        }
         Kind::MissingToken(token, place) => {
+            let place = place.replace("object map literal", "record");
             let fault = Fault::new(format!("expected `{token}` {place}"));
             let rest = source.text[span(source, error.position()).range.start..].trim();
             if rest.is_empty() { fault.hint("the script ends here: is a closing `}` or `)` missing?") } else { fault }
@@ -91,8 +105,14 @@ pub(super) fn from_parse_error(error: &ParseError, source: &Arc<Source>) -> Diag
     fault.at(span(source, error.position()))
 }
 
-/// An error of a run, at its innermost place. `files` and `functions` are the program's.
-pub(super) fn from_run(error: &EvalAltResult, files: &[Arc<Source>], functions: &Functions) -> Diagnostic {
+/// An error of a run, at its innermost place. `files` and `functions` are the program's, `surface` is where to point if
+/// the engine knows no place.
+pub(super) fn from_run(
+    error: &EvalAltResult,
+    surface: &Span,
+    files: &[Arc<Source>],
+    functions: &Functions,
+) -> Diagnostic {
     let mut place = error.position();
     let mut file = 0;
     let mut at = 0;
@@ -121,7 +141,7 @@ pub(super) fn from_run(error: &EvalAltResult, files: &[Arc<Source>], functions: 
             format!("{what} was called at {}:{line}:{column}", files[*from].name)
         });
     }
-    fault.at(span(&files[file], place))
+    fault.at(if place.is_none() { surface.clone() } else { span(&files[file], place) })
 }
 
 /// A function's name as written; `None` for closures.
@@ -144,10 +164,8 @@ fn explain(error: &EvalAltResult, functions: &Functions, file: usize) -> Fault {
         Kind::ErrorPropertyNotFound(name, _) => Fault::new(format!("this record has no `{name}`"))
             .hint(format!("`\"{name}\" in record` tells whether it has")),
         Kind::ErrorDotExpr(message, _) => unknown_property(message),
-        Kind::ErrorTooManyOperations(_) => {
-            Fault::new(format!("the script did not finish within {MAX_OPERATIONS} operations"))
-                .hint("is there a loop without an end?")
-        }
+        Kind::ErrorTooManyOperations(_) => Fault::new(format!("{OUT_OF_OPERATIONS} {MAX_OPERATIONS} operations"))
+            .hint("is there a loop without an end?"),
         Kind::ErrorStackOverflow(_) => Fault::new(format!("functions call each other more than {MAX_CALL_DEPTH} deep"))
             .hint("does a function call itself without an end?"),
         Kind::ErrorDataTooLarge(what, _) if what.contains("string") => {
@@ -179,6 +197,42 @@ fn explain(error: &EvalAltResult, functions: &Functions, file: usize) -> Fault {
             Fault::new(lower_first(&text))
         }
     }
+}
+
+/// A variable that the parser does not know: what else the text around it may mean.
+fn undefined_variable(name: &str, source: &Source, position: Position) -> Fault {
+    let start = source.offset(position.line().unwrap_or(1), position.position().unwrap_or(1));
+    let behind = source.text[start..].strip_prefix(name).unwrap_or_default().trim_start();
+    let is_key = OutputSet::spelled(name).is_some() || name.starts_with(AOV_PREFIX);
+    if is_key && behind.starts_with(':') {
+        return Fault::new(format!("there is no variable `{name}` here")).hint("a record begins with `#{`, not `{`");
+    }
+    let declared = |line: &str| {
+        let mut words = line.split(|c: char| !c.is_alphanumeric() && c != '_').filter(|word| !word.is_empty());
+        matches!(words.next(), Some("let" | "const")) && words.next() == Some(name)
+    };
+    if source.text.lines().any(|line| !line.starts_with([' ', '\t']) && declared(line)) {
+        return Fault::new(format!("there is no variable `{name}` here"))
+            .hint("functions do not see what stands outside of them: move it into `params()` or into this function");
+    }
+    let fault = unknown_variable(name);
+    let names = declared_names(&source.text);
+    match nearest(name, names.iter().copied().filter(|known| *known != name)) {
+        Some(near) if fault.hints.is_empty() => fault.hint(format!("did you mean `{near}`?")),
+        _ => fault,
+    }
+}
+
+/// Every name that a text declares by `let` or `const` anywhere.
+fn declared_names(text: &str) -> Vec<&str> {
+    let mut words = text.split(|c: char| !c.is_alphanumeric() && c != '_').filter(|word| !word.is_empty());
+    let mut names = Vec::new();
+    while let Some(word) = words.next() {
+        if matches!(word, "let" | "const") {
+            names.extend(words.next());
+        }
+    }
+    names
 }
 
 fn unknown_variable(name: &str) -> Fault {
@@ -253,6 +307,7 @@ pub(super) fn type_name(rhai: &str) -> String {
         "&str | ImmutableString | String" | "string" => "text",
         "map" => "record",
         "Fn" => "function",
+        other if other.contains("ops::range::Range") => "range",
         other => other,
     }
     .to_owned()

@@ -22,6 +22,10 @@ pub(super) const MAX_OPERATIONS: u64 = 500_000;
 pub(super) const MAX_CALL_DEPTH: usize = 8;
 /// Levels of nesting in the text of a function: each block, bracket and operator adds some.
 pub(super) const MAX_EXPRESSION_DEPTH: usize = 64;
+/// Bytes of a script: far more than anybody writes, and read in no time.
+pub(super) const MAX_SCRIPT: usize = 1 << 20;
+/// Functions of a script: some work grows with the square of their number.
+pub(super) const MAX_FUNCTIONS: usize = 512;
 /// Bytes of a text.
 pub(super) const MAX_TEXT: usize = 4096;
 /// Elements of an array, with those of arrays in it.

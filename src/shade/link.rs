@@ -16,10 +16,10 @@ use rhai::{AST, ASTNode, Engine, Expr, FnAccess, FnCallExpr, Module, Position, S
 
 use super::closures;
 use super::fault::{Fault, from_parse_error, span};
-use super::host;
+use super::host::{self, MAX_FUNCTIONS, MAX_SCRIPT};
 use super::library;
 use super::script::{Functions, ScriptFunction, name_span};
-use crate::diag::{Diagnostics, Source, nearest};
+use crate::diag::{Diagnostic, Diagnostics, Source, Span, nearest};
 use crate::scene::material::{ScriptFiles, TextureKey};
 
 /// The most modules of a script.
@@ -181,7 +181,12 @@ pub(super) fn imports(source: &Arc<Source>) -> Vec<Import> {
     statements.filter_map(|statement| import(statement).ok().flatten()).collect()
 }
 
-fn parse(source: &Arc<Source>) -> Result<(AST, Vec<(Token, Position)>), crate::diag::Diagnostic> {
+fn parse(source: &Arc<Source>) -> Result<(AST, Vec<(Token, Position)>), Diagnostic> {
+    let size = source.text.len();
+    if size > MAX_SCRIPT {
+        let fault = Diagnostic::error(format!("a script may have at most {MAX_SCRIPT} bytes, and this has {size}"));
+        return Err(fault.in_file(&source.name));
+    }
     let tokens = Arc::new(Mutex::new(Vec::new()));
     let seen = Arc::clone(&tokens);
     let engine = host::parser(move |token, position| {
@@ -189,11 +194,16 @@ fn parse(source: &Arc<Source>) -> Result<(AST, Vec<(Token, Position)>), crate::d
         token
     });
     let ast = compile(&engine, source)?;
+    let count = ast.iter_fn_def().count();
+    if count > MAX_FUNCTIONS {
+        let fault = Fault::new(format!("a script may have at most {MAX_FUNCTIONS} functions, and this has {count}"));
+        return Err(fault.at(Span::new(source, 0..0)));
+    }
     let tokens = std::mem::take(&mut *tokens.lock().unwrap_or_else(PoisonError::into_inner));
     Ok((ast, tokens))
 }
 
-fn compile(engine: &Engine, source: &Arc<Source>) -> Result<AST, crate::diag::Diagnostic> {
+fn compile(engine: &Engine, source: &Arc<Source>) -> Result<AST, Diagnostic> {
     engine.compile(source.text.as_str()).map_err(|error| from_parse_error(&error, source))
 }
 

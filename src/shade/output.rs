@@ -62,7 +62,11 @@ impl Row {
     pub fn read(value: &Dynamic, aovs: &[String]) -> Result<Self, RowFault> {
         let Ok(record) = value.as_map_ref() else {
             let fault = Fault::new(format!("`surface` must return a record, but it returned {}", kind(value)));
-            let hint = if value.is_unit() { "is there a `;` after the record?" } else { "return #{ base_color: … }" };
+            let hint = if value.is_unit() {
+                "the record comes last: a `let`, a loop, or an `if` without `else` gives nothing"
+            } else {
+                "return #{ base_color: … }"
+            };
             return Err(RowFault { key: None, fault: fault.hint(hint) });
         };
         let mut row = Self::default();

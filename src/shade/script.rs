@@ -12,7 +12,7 @@ use super::closures;
 use super::fault::{Fault, from_run, span};
 use super::link::{Linked, link};
 use super::names::AOV_PREFIX;
-use crate::diag::{Diagnostic, Diagnostics, Source, Span};
+use crate::diag::{Diagnostic, Diagnostics, Source, Span, nearest};
 use crate::scene::material::ScriptFiles;
 
 /// A parsed script that has a `surface`, linked with its modules.
@@ -85,11 +85,13 @@ impl Program {
         let mut faults = Diagnostics::default();
         let surface = Self::find(&functions, "surface", 2, "surface(hit, p)", &mut faults);
         if surface.is_none() && !faults.has_errors() {
-            faults.push(
-                Fault::new("this shader has no function `surface`")
-                    .hint("write: fn surface(hit, p) { #{ base_color: rgb(0.8, 0.2, 0.1) } }")
-                    .at(Span::new(source, 0..0)),
-            );
+            let fault = Fault::new("this shader has no function `surface`");
+            let fault = match nearest("surface", functions.values().filter(|f| f.file == 0 && !f.is_closure()).map(|f| f.name.as_str())) {
+                Some(near) => fault.hint(format!("is `{near}` meant to be it?")),
+                None => fault,
+            };
+            let hint = "write: fn surface(hit, p) { #{ base_color: rgb(0.8, 0.2, 0.1) } }";
+            faults.push(fault.hint(hint).at(Span::new(source, 0..0)));
         }
         let params = Self::find(&functions, "params", 0, "params()", &mut faults);
         match surface {
@@ -163,7 +165,7 @@ impl Program {
 
     /// An error of a run, with its place.
     pub fn explain(&self, error: &EvalAltResult) -> Diagnostic {
-        from_run(error, &self.files, &self.functions)
+        from_run(error, &self.surface.span, &self.files, &self.functions)
     }
 
     /// What the analysis found, at its place.

@@ -24,7 +24,7 @@ pub enum Verdict {
     /// Every hit gives the same, so nothing was to be compared.
     Constant,
     /// It does not compile; both say the same.
-    Refused,
+    Refused(String),
 }
 
 /// Compares the two ways of running a script.
@@ -37,7 +37,7 @@ pub fn compare(script: &str, hits: &HitBatch, wanted: OutputSet) -> Result<Verdi
     let reference = Shaders::compile_for(&scene, &Host::new(), ShadingMode::Interpreter);
     let (kernels, reference) = match (kernels, reference) {
         (Ok((kernels, _)), Ok((reference, _))) => (kernels, reference),
-        (Err(a), Err(b)) if rendered(&a) == rendered(&b) => return Ok(Verdict::Refused),
+        (Err(a), Err(b)) if rendered(&a) == rendered(&b) => return Ok(Verdict::Refused(rendered(&a))),
         (a, b) => return Err(format!("one compiles: {:?}\n{:?}", a.err(), b.err())),
     };
     let shader = kernels.of(MaterialId(0));
@@ -134,6 +134,13 @@ fn scene(script: &str) -> Scene {
         let transform = Affine2::from_scale_angle_translation(Vec2::new(2.0, 0.5), 0.3, Vec2::new(0.1, 0.2));
         let place = TextureRef { texture: TextureId(0), uv_set: 0, transform };
         params.insert("map".to_owned(), (ParamValue::Texture(place), None));
+    }
+    for number in 0..2 {
+        builder.lights.push(Light {
+            name: format!("light {number}"),
+            kind: LightKind::Point { position: DVec3::Y, intensity: Vec3::ONE },
+            shadows: false,
+        });
     }
     builder.add_material(Material {
         name: "random".into(),

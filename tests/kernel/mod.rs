@@ -42,12 +42,15 @@ fn random_scripts_give_the_same_bits() {
                 *reasons.entry(what.to_owned()).or_default() += 1;
             }
             Ok(Verdict::Constant) => *reasons.entry("constant".into()).or_default() += 1,
-            Ok(Verdict::Refused) => *reasons.entry("refused".into()).or_default() += 1,
+            Ok(Verdict::Refused(why)) => *reasons.entry(format!("refused: {}", why.lines().next().unwrap_or_default())).or_default() += 1,
             Err(what) => failures.push((script.len(), format!("script {seed}: {what}\n{script}"))),
         }
     }
     println!("{kernels} of {count} ran as kernels; of the others: {reasons:#?}");
     failures.sort();
+    if std::env::var_os("TUSCHE_ALL").is_some() {
+        failures.iter().take(20).for_each(|(_, failure)| println!("{failure}\n"));
+    }
     if let Some((_, shortest)) = failures.first() {
         panic!("{} of {count} scripts differ; the shortest is {shortest}", failures.len());
     }

@@ -264,6 +264,9 @@ impl Walker<'_> {
     }
 
     fn key(&mut self, record: &Record, name: &str, position: Position) -> Abstract {
+        if record.is_params {
+            self.parameters.insert(name.into());
+        }
         match record.fields.get(name) {
             Some(field) if field.always => field.value.clone(),
             Some(field) => {

@@ -28,8 +28,9 @@ mod soundness;
 mod statements;
 mod switch;
 mod value;
-mod walk;
+pub(in crate::shade) mod walk;
 
+use std::collections::BTreeSet;
 use std::fmt;
 use std::rc::Rc;
 use std::sync::Arc;
@@ -83,6 +84,8 @@ pub struct Analysis {
     pub aovs: Vec<(String, OutputFact)>,
     /// Attributes that code which may run asks for, sorted.
     pub attributes: Vec<String>,
+    /// Parameters that code which may run reads.
+    pub parameters: BTreeSet<String>,
     /// Whether the facts are known to be complete. If not, all inputs are assumed read and all outputs written.
     pub complete: bool,
     /// If not complete: the construct that stopped the analysis.
@@ -125,6 +128,7 @@ fn analyse_functions(
                 analysis.add(key, field, &mut walker);
             }
             analysis.aovs.sort_by(|a, b| a.0.cmp(&b.0));
+            analysis.parameters = walker.parameters.iter().map(|name| (**name).to_owned()).collect();
             analysis.findings = walker.findings.into_iter().collect();
             analysis.attributes = walker.attributes.into_iter().collect();
             analysis
@@ -217,7 +221,13 @@ impl Analysis {
             None => {
                 let names = OutputSet::named().map(|(name, _)| name);
                 let message = format!("there is no output `{key}`");
-                let hint = nearest_hint(key, names);
+                let hint = nearest_hint(key, names).or_else(|| {
+                    let all: Vec<_> = OutputSet::named().map(|(name, _)| name).collect();
+                    Some(format!(
+                        "there are: {}; a layer of your own is called `{AOV_PREFIX}` and a name",
+                        all.join(", ")
+                    ))
+                });
                 walker.findings.insert(Finding::new(field.place, message, hint));
             }
         }

@@ -104,6 +104,8 @@ pub(super) struct Walker<'a> {
     pub calls: Vec<Call>,
     /// Inputs that were read.
     pub inputs: InputSet,
+    /// Parameters that were read.
+    pub parameters: BTreeSet<Rc<str>>,
     /// By place, so that code that is walked twice is blamed once.
     pub findings: BTreeSet<Finding>,
     /// Why the walk gave up.
@@ -122,6 +124,7 @@ impl<'a> Walker<'a> {
             texture_bounds: BTreeMap::new(),
             calls: vec![Call::default()],
             inputs: InputSet::empty(),
+            parameters: BTreeSet::new(),
             findings: BTreeSet::new(),
             blame: None,
             next_identity: 0,
@@ -177,6 +180,11 @@ impl<'a> Walker<'a> {
     pub fn escape(&mut self, value: &Abstract) -> InputSet {
         if value.holds_hit() {
             self.inputs = InputSet::all();
+        }
+        if let Shape::Record(record) = &value.shape
+            && record.is_params
+        {
+            self.parameters.extend(record.fields.keys().cloned());
         }
         value.all_inputs()
     }

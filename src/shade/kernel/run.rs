@@ -341,9 +341,9 @@ impl Registers {
                 let (a, b) = (self.ints.view(operands[0]), self.ints.view(operands[1]));
                 let mask = self.bools.view(operands[2]);
                 op.in_loop(Checked { out: &mut out[..blocks], a, b, mask, failed: &mut self.failed });
-                if results[0].uniform && !operands[2].uniform {
-                    // One failure for all hits that are live.
-                    self.fail_uniform(op.apply(self.ints.view(operands[0]).row(0), self.ints.view(operands[1]).row(0)).is_none(), operands[2], chunk.blocks());
+                if results[0].uniform {
+                    let [a, b] = [operands[0], operands[1]].map(|operand| self.ints.view(operand).row(0));
+                    self.fail_uniform(op.apply(a, b).is_none(), operands[2], chunk.blocks());
                 }
                 self.ints.put(results[0], out);
             }

@@ -15,7 +15,7 @@ use crate::scene::texture::{self, Image, Texture, TextureFilter, TextureRef, Wra
 use crate::shade::builtin;
 
 /// What a script's name starts with if it comes with Tusche.
-const BUILTIN: &str = "builtin:";
+pub(in crate::scene::file) const BUILTIN: &str = "builtin:";
 
 impl Resolver<'_> {
     pub(super) fn materials(&mut self, materials: &BTreeMap<String, format::Material>) {

@@ -24,6 +24,7 @@ use crate::scene::shape::Shape;
 use crate::scene::texture::Image;
 use crate::scene::{SceneBuilder, framing, script_files};
 use camera::ModelCamera;
+pub(super) use material::BUILTIN;
 
 /// Frames of an animation in a second.
 const FRAME_RATE: f64 = 24.0;

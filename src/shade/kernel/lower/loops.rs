@@ -380,6 +380,13 @@ impl<'a> Lowerer<'a> {
                     start[index].meaning = next.map(&mut |operand| builder.nothing(builder.kind(operand)));
                     settled = false;
                 }
+                let builder = &self.builder;
+                if let Some(wider) =
+                    start[index].meaning.with_keys_of(next, &mut |operand| builder.nothing(builder.kind(operand)))
+                {
+                    start[index].meaning = wider;
+                    settled = false;
+                }
                 if !start[index].meaning.same_form(next) {
                     let what = format!(
                         "a variable that is {} before a round of a loop and {} after it",

@@ -132,6 +132,27 @@ impl Meaning {
         total
     }
 
+    /// A record that has the keys of another, too, but where it had none, nowhere present: what a loop must start from
+    /// that sets them. `None` if it has them all, or is no record.
+    pub fn with_keys_of(&self, other: &Self, nothing: &mut impl FnMut(Operand) -> Operand) -> Option<Self> {
+        let (Self::Record(own), Self::Record(others)) = (self, other) else { return None };
+        let mut wider = Record::clone(own);
+        let mut news = false;
+        for (key, field) in others.iter() {
+            if let Some(known) = wider.get_mut(key) {
+                if let Some(value) = known.value.with_keys_of(&field.value, nothing) {
+                    known.value = value;
+                    news = true;
+                }
+            } else {
+                let field = Field { value: field.value.map(nothing), present: Operand::FALSE };
+                wider.insert(Rc::clone(key), field);
+                news = true;
+            }
+        }
+        news.then(|| Self::Record(Rc::new(wider)))
+    }
+
     /// Whether two have the same structure, so that one can follow the other in a loop.
     pub fn same_form(&self, other: &Self) -> bool {
         match (self, other) {
