@@ -14,6 +14,8 @@ use rhai::packages::{
 use rhai::{Engine, FloatWrapper, LexError, OptimizationLevel, Position, Token};
 
 use super::library;
+use super::native::{self, Constant, NativeFunction, NativeValue, Package as NativePackage};
+use crate::diag::Diagnostics;
 use crate::scene::texture::Texture;
 
 /// Operations of one call of `surface` or `params`: enough for thousands of noise lookups, and a fraction of a second.
@@ -37,13 +39,25 @@ pub(super) const MAX_MAP: usize = 256;
 #[derive(Clone, Default)]
 pub struct Host {
     packages: Vec<Register>,
+    natives: Vec<Owned<NativeFunction>>,
+    constants: Vec<Owned<(&'static str, NativeValue)>>,
+    /// The package that is being registered.
+    package: Option<&'static str>,
+    faults: Diagnostics,
 }
+
+/// What a package registered.
+type Owned<T> = (Option<&'static str>, T);
 
 type Register = Arc<dyn Fn(&mut Engine) + Send + Sync>;
 
 impl fmt::Debug for Host {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Host").field("packages", &self.packages.len()).finish()
+        f.debug_struct("Host")
+            .field("packages", &self.packages.len())
+            .field("natives", &self.natives)
+            .field("constants", &self.constants)
+            .finish_non_exhaustive()
     }
 }
 
@@ -54,9 +68,80 @@ impl Host {
         Self::default()
     }
 
-    /// The same host with more functions: `register` is called on every engine that is made (one per thread). The
-    /// limits and the sandbox are set afterwards, so it cannot loosen them. A constant is a function without parameters.
-    /// Pictures do not depend on thread or tile order only as long as the functions depend on nothing but their arguments.
+    /// The same host with one more function. A name that is taken is a fault, which [`check`](Self::check) and
+    /// [`Shaders::compile`](super::Shaders::compile) tell.
+    #[must_use]
+    pub fn with_function(mut self, function: NativeFunction) -> Self {
+        let name = function.name();
+        match function.fault().or_else(|| self.taken(name)) {
+            Some(why) => self.faults.push(native::refused("native function", name, self.package, &why)),
+            None => self.natives.push((self.package, function)),
+        }
+        self
+    }
+
+    /// The same host with a word that stands for a number or truth in scripts. (A constant vector is a function without
+    /// parameters.) A name that is taken is a fault.
+    #[must_use]
+    pub fn with_constant(mut self, name: &'static str, value: impl Constant) -> Self {
+        match self.taken(name) {
+            Some(why) => self.faults.push(native::refused("constant", name, self.package, &why)),
+            None => self.constants.push((self.package, (name, value.into()))),
+        }
+        self
+    }
+
+    /// The same host with all that a package registers.
+    #[must_use]
+    pub fn with_package(mut self, package: &(impl NativePackage + ?Sized)) -> Self {
+        let outer = self.package.replace(package.name());
+        let mut host = package.register(self);
+        host.package = outer;
+        host
+    }
+
+    /// Whether everything could be registered.
+    ///
+    /// # Errors
+    /// All names that are taken, and all functions that cannot be called by scripts.
+    pub fn check(&self) -> Result<(), Diagnostics> {
+        if self.faults.has_errors() { Err(self.faults.clone()) } else { Ok(()) }
+    }
+
+    /// The functions with known types that were added, in the order of their registration.
+    pub fn natives(&self) -> impl Iterator<Item = &NativeFunction> {
+        self.natives.iter().map(|(_, function)| function)
+    }
+
+    /// The function with known types of a name.
+    #[must_use]
+    pub fn native(&self, name: &str) -> Option<&NativeFunction> {
+        self.natives().find(|function| function.name() == name)
+    }
+
+    /// All functions that scripts may call, for messages and reference pages: the library's, then those that were added
+    /// with known types.
+    pub fn functions(&self) -> impl Iterator<Item = library::Function<'_>> {
+        #[expect(clippy::map_identity, reason = "it shortens the lifetime")]
+        let library = library::functions().map(|function| -> library::Function<'_> { function });
+        library.chain(self.natives().map(NativeFunction::listed))
+    }
+
+    /// Why a name cannot be registered.
+    fn taken(&self, name: &str) -> Option<String> {
+        let functions = self.natives.iter().map(|(package, function)| (package, function.name()));
+        let constants = self.constants.iter().map(|(package, (known, _))| (package, *known));
+        match functions.chain(constants).find(|(_, known)| *known == name) {
+            Some((Some(package), _)) => Some(format!("is registered by the package `{package}` already")),
+            Some((None, _)) => Some("is registered already".into()),
+            None => native::taken(name),
+        }
+    }
+
+    /// The same host with functions whose types are not known, so that shaders which call them are not compiled:
+    /// `register` is called on every engine that is made (one per thread). [`with_function`](Self::with_function) is the
+    /// better door where it fits. The limits and the sandbox are set afterwards, so it cannot loosen them. Pictures do not
+    /// depend on thread or tile order only as long as the functions depend on nothing but their arguments.
     #[must_use]
     pub fn with(mut self, register: impl Fn(&mut rhai::Engine) + Send + Sync + 'static) -> Self {
         self.packages.push(Arc::new(register));
@@ -76,7 +161,13 @@ impl Host {
         for register in &self.packages {
             register(&mut engine);
         }
+        native::register(&mut engine, &self.natives().cloned().collect::<Vec<_>>());
         confine(&mut engine);
+        if !self.constants.is_empty() {
+            let constants = self.constants.clone();
+            #[allow(deprecated, reason = "marked so only because it may change; the version of rhai is pinned")]
+            engine.on_parse_token(move |token, _, _| replace(constant(&constants, token)));
+        }
         engine
     }
 }
@@ -112,6 +203,25 @@ fn confine(engine: &mut Engine) {
         .on_debug(|_, _, _| {});
     #[allow(deprecated, reason = "marked so only because it may change; the version of rhai is pinned")]
     engine.on_parse_token(|token, _, _| replace(token));
+}
+
+/// A registered constant in place of its name.
+fn constant(constants: &[Owned<(&'static str, NativeValue)>], token: Token) -> Token {
+    let Token::Identifier(name) = &token else { return token };
+    match constants.iter().find(|(_, (known, _))| *known == name.as_str()) {
+        Some((_, (name, NativeValue::Float(x)))) => {
+            Token::FloatConstant((FloatWrapper::new(*x), (*name).into()).into())
+        }
+        Some((_, (_, NativeValue::Int(x)))) => Token::IntegerConstant(*x),
+        Some((_, (_, NativeValue::Bool(x)))) => {
+            if *x {
+                Token::True
+            } else {
+                Token::False
+            }
+        }
+        _ => token,
+    }
 }
 
 /// Replaces words that stand for numbers by those numbers, and what has no place in a shader by an error that says so.

@@ -10,6 +10,7 @@ use super::host::Host;
 use super::kernel::{Kernel, Surroundings};
 use super::library::ParameterRecord;
 use super::names::{InputSet, OutputSet};
+use super::native::NativeFunction;
 use super::params::{self, Params};
 use super::script::Program;
 use crate::diag::{Diagnostic, Diagnostics};
@@ -67,6 +68,7 @@ pub struct Shader {
     material_id: u32,
     light_count: usize,
     textures: Arc<[Arc<Texture>]>,
+    natives: Arc<[NativeFunction]>,
 }
 
 impl Shader {
@@ -134,7 +136,8 @@ impl Shader {
     /// The kernel for batches with so many lights.
     pub(super) fn kernel(&self, light_count: usize) -> Option<Arc<Kernel>> {
         let kernel = self.kernel.as_ref()?.as_ref().ok()?;
-        if light_count == self.light_count || !self.analysis.inputs.intersects(InputSet::LIGHT_COUNT | InputSet::LIGHT) {
+        if light_count == self.light_count || !self.analysis.inputs.intersects(InputSet::LIGHT_COUNT | InputSet::LIGHT)
+        {
             return Some(Arc::clone(kernel));
         }
         let mut others = self.other_kernels.lock().unwrap_or_else(PoisonError::into_inner);
@@ -149,6 +152,7 @@ impl Shader {
     fn lower(&self, light_count: usize) -> Result<Arc<Kernel>, Finding> {
         let surroundings = Surroundings {
             textures: &self.textures,
+            natives: &self.natives,
             material_id: self.material_id,
             light_count: Some(light_count),
         };
@@ -178,7 +182,7 @@ impl Shaders {
     /// Compiles and analyses all scripts of a scene. Warnings come beside the value.
     ///
     /// # Errors
-    /// Every syntax error, missing `surface`, fault in `params()`, unknown or ill-typed parameter, and what the analysis
+    /// What the host could not register; every syntax error, missing `surface`, fault in `params()`, unknown or ill-typed parameter, and what the analysis
     /// finds to be certainly wrong (unknown inputs, outputs and parameters in code that may run), at its place.
     pub fn compile(scene: &Scene, host: &Host) -> Result<(Self, Diagnostics), Diagnostics> {
         Self::compile_for(scene, host, ShadingMode::Auto)
@@ -190,7 +194,7 @@ impl Shaders {
     /// As [`compile`](Self::compile); and with [`ShadingMode::Kernel`], every construct that cannot be part of a kernel.
     pub fn compile_for(scene: &Scene, host: &Host, mode: ShadingMode) -> Result<(Self, Diagnostics), Diagnostics> {
         let engine = host.engine(&BTreeSet::new(), scene.textures());
-        let mut faults = Diagnostics::default();
+        let mut faults = host.check().err().unwrap_or_default();
         let mut keep = |result: Result<_, Diagnostics>| result.map_err(|found| faults.extend(found)).ok();
 
         let scripts: Vec<_> = scene
@@ -205,6 +209,7 @@ impl Shaders {
             .collect();
 
         let textures: Arc<[Arc<Texture>]> = scene.textures().into();
+        let natives: Arc<[NativeFunction]> = host.natives().cloned().collect();
         let mut shaders = Vec::new();
         for (index, material) in scene.materials().iter().enumerate() {
             let sets = scene.attributes().of_material(MaterialId::from_index(index));
@@ -231,6 +236,7 @@ impl Shaders {
                         material_id: MaterialId::from_index(index).0 + 1,
                         light_count: scene.lights().len(),
                         textures: Arc::clone(&textures),
+                        natives: Arc::clone(&natives),
                     };
                     if mode != ShadingMode::Interpreter && !shader.analysis.is_constant() {
                         shader.kernel = Some(shader.lower(shader.light_count));

@@ -12,6 +12,7 @@ use super::closures;
 use super::fault::{Fault, from_run, span};
 use super::link::{Linked, link};
 use super::names::AOV_PREFIX;
+use super::native;
 use crate::diag::{Diagnostic, Diagnostics, Source, Span, nearest};
 use crate::scene::material::ScriptFiles;
 
@@ -152,7 +153,8 @@ impl Program {
             scope.push_dynamic(name.clone(), value);
         }
         #[allow(deprecated, reason = "the one door to a cache of resolved functions that lasts longer than a call")]
-        engine.eval_statements_raw(&mut global, caches, &mut scope, &function.body)
+        let result = engine.eval_statements_raw(&mut global, caches, &mut scope, &function.body);
+        result.map_err(|error| native::clarify(engine, error))
     }
 
     /// What `params()` returns; an empty record without it.

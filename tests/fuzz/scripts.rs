@@ -82,12 +82,8 @@ impl Writer<'_> {
     }
 
     fn variable(&mut self, of: Type, to_change: bool) -> Option<String> {
-        let names: Vec<String> = self
-            .variables
-            .iter()
-            .filter(|v| v.of == of && (v.changes || !to_change))
-            .map(|v| v.name.clone())
-            .collect();
+        let names: Vec<String> =
+            self.variables.iter().filter(|v| v.of == of && (v.changes || !to_change)).map(|v| v.name.clone()).collect();
         let choice = self.choose(251);
         (!names.is_empty()).then(|| names[choice % names.len()].clone())
     }
@@ -192,7 +188,9 @@ impl Writer<'_> {
                 let body = self.loop_body(None, depth);
                 let end = self.expression(Type::Int, 1);
                 let limit = self.pick(&["3", "7", "200"]);
-                format!("let {name} = 0; loop {{ {name} += 1; if {name} > {limit} || {name} == {end} {{ break; }} {body} }}")
+                format!(
+                    "let {name} = 0; loop {{ {name} += 1; if {name} > {limit} || {name} == {end} {{ break; }} {body} }}"
+                )
             }
             15 => {
                 let name = self.name("i");
@@ -419,11 +417,8 @@ impl Writer<'_> {
                     }
                 }
                 14 => {
-                    let (subject, first, second) = (
-                        self.expression(Type::Int, 1),
-                        self.expression(of, depth - 1),
-                        self.expression(of, depth - 1),
-                    );
+                    let (subject, first, second) =
+                        (self.expression(Type::Int, 1), self.expression(of, depth - 1), self.expression(of, depth - 1));
                     return format!("(switch {subject} {{ 0 | 1 => {first}, _ => {second} }})");
                 }
                 _ => {}
@@ -483,14 +478,27 @@ impl Writer<'_> {
 
     fn float(&mut self, depth: usize) -> String {
         const LITERALS: [&str; 14] = [
-            "0.5", "0.0", "1.0", "-1.0", "2.0", "0.25", "1e-10", "3e30", "-0.1", "7.0", "1.0000001", "0.3", "-0.0", "1e-41",
+            "0.5",
+            "0.0",
+            "1.0",
+            "-1.0",
+            "2.0",
+            "0.25",
+            "1e-10",
+            "3e30",
+            "-0.1",
+            "7.0",
+            "1.0000001",
+            "0.3",
+            "-0.0",
+            "1e-41",
         ];
         if depth == 0 {
             return match self.choose(5) {
                 0 => self.pick(&LITERALS).into(),
-                1 if self.has_hit => {
-                    self.pick(&["hit.distance", "hit.curvature", "hit.time", "p.half", "hit.pixels_per_unit", "hit.depth"]).into()
-                }
+                1 if self.has_hit => self
+                    .pick(&["hit.distance", "hit.curvature", "hit.time", "p.half", "hit.pixels_per_unit", "hit.depth"])
+                    .into(),
                 2 if self.this => "this".into(),
                 3 => self.variable(Type::Record, false).map_or_else(|| "0.6".into(), |name| format!("{name}.a")),
                 _ => self.variable(Type::Float, false).unwrap_or_else(|| "0.75".into()),
@@ -505,13 +513,18 @@ impl Writer<'_> {
             }
             8 => format!("{}.{}", self.expression(Type::Vec3, d), self.pick(&["x", "y", "z", "r", "b"])),
             9 => format!("clamp({}, {}, {})", self.expression(Type::Float, d), self.float(0), self.float(0)),
-            10 => format!("mix({}, {}, {})", self.float(0), self.expression(Type::Float, d), self.expression(Type::Float, d)),
+            10 => format!(
+                "mix({}, {}, {})",
+                self.float(0),
+                self.expression(Type::Float, d),
+                self.expression(Type::Float, d)
+            ),
             11 => format!("step({}, {})", self.expression(Type::Float, d), self.expression(Type::Number, d)),
             12 => format!("smoothstep({}, {}, {})", self.float(0), self.float(0), self.expression(Type::Float, d)),
             13 | 14 => {
                 const NAMES: [&str; 22] = [
-                    "sqrt", "abs", "floor", "ceil", "round", "fract", "sign", "saturate", "sin", "cos", "tan", "exp", "exp2",
-                    "ln", "log2", "log", "degrees", "radians", "asin", "atan", "tanh", "hash",
+                    "sqrt", "abs", "floor", "ceil", "round", "fract", "sign", "saturate", "sin", "cos", "tan", "exp",
+                    "exp2", "ln", "log2", "log", "degrees", "radians", "asin", "atan", "tanh", "hash",
                 ];
                 let name = self.pick(&NAMES);
                 format!("{name}({})", self.expression(Type::Float, d))
@@ -528,7 +541,11 @@ impl Writer<'_> {
             21 if self.has_hit => format!("hit.light({}).visibility", self.expression(Type::Int, 0)),
             22 if self.has_hit => "hit.texture(p.map).g".into(),
             23 => format!("fbm({}, {})", self.expression(Type::Vec3, d), 1 + self.choose(3)),
-            24 => format!("{}({})", self.pick(&["value_noise", "gradient_noise", "cellular_noise", "cell_id"]), self.expression(Type::Vec2, d)),
+            24 => format!(
+                "{}({})",
+                self.pick(&["value_noise", "gradient_noise", "cellular_noise", "cell_id"]),
+                self.expression(Type::Vec2, d)
+            ),
             25 => {
                 let kind = self.pick(&["linear", "constant", "smooth"]);
                 let (t, a, b, c) = (self.expression(Type::Float, d), self.float(0), self.float(0), self.float(0));
@@ -561,7 +578,9 @@ impl Writer<'_> {
         if depth == 0 {
             return match self.choose(5) {
                 0 => self.pick(&["1", "0", "2", "3", "-4", "5", "1000000007", "9223372036854775807"]).into(),
-                1 if self.has_hit => self.pick(&["hit.object_id", "hit.polygon_id", "p.three", "hit.material_id"]).into(),
+                1 if self.has_hit => {
+                    self.pick(&["hit.object_id", "hit.polygon_id", "p.three", "hit.material_id"]).into()
+                }
                 2 => self.variable(Type::Record, false).map_or_else(|| "1".into(), |name| format!("{name}.c.d")),
                 _ => self.variable(Type::Int, false).unwrap_or_else(|| "2".into()),
             };
@@ -618,7 +637,12 @@ impl Writer<'_> {
         }
         let d = depth - 1;
         match self.choose(6) {
-            0 | 1 => format!("({} {} {})", self.expression(Type::Vec2, d), self.pick(&["+", "-", "*", "/"]), self.expression(Type::Vec2, d)),
+            0 | 1 => format!(
+                "({} {} {})",
+                self.expression(Type::Vec2, d),
+                self.pick(&["+", "-", "*", "/"]),
+                self.expression(Type::Vec2, d)
+            ),
             2 => format!("{}.{}", self.expression(Type::Vec3, d), self.pick(&["xy", "zx", "gg"])),
             3 => format!("{}({})", self.pick(&["floor", "fract", "abs", "normalize"]), self.expression(Type::Vec2, d)),
             4 => format!("mix({}, {}, {})", self.vec2(0), self.expression(Type::Vec2, d), self.float(0)),
@@ -629,17 +653,38 @@ impl Writer<'_> {
     fn vec3(&mut self, depth: usize) -> String {
         if depth == 0 {
             return match self.choose(4) {
-                0 if self.has_hit => self.pick(&["hit.normal", "hit.position", "hit.irradiance", "vec3(hit.uv, 0.5)", "p.tint", "hit.incoming"]).into(),
+                0 if self.has_hit => self
+                    .pick(&[
+                        "hit.normal",
+                        "hit.position",
+                        "hit.irradiance",
+                        "vec3(hit.uv, 0.5)",
+                        "p.tint",
+                        "hit.incoming",
+                    ])
+                    .into(),
                 1 => format!("vec3({}, 0.5, {})", self.float(0), self.float(0)),
-                2 => self.variable(Type::Record, false).map_or_else(|| "vec3(1, 2, 3)".into(), |name| format!("{name}.b")),
+                2 => self
+                    .variable(Type::Record, false)
+                    .map_or_else(|| "vec3(1, 2, 3)".into(), |name| format!("{name}.b")),
                 _ => self.variable(Type::Vec3, false).unwrap_or_else(|| "vec3(0.25, -0.5, 1.0)".into()),
             };
         }
         let d = depth - 1;
         match self.choose(20) {
-            0..=4 => format!("({} {} {})", self.expression(Type::Vec3, d), self.pick(&["+", "-", "*", "/"]), self.expression(Type::Vec3, d)),
+            0..=4 => format!(
+                "({} {} {})",
+                self.expression(Type::Vec3, d),
+                self.pick(&["+", "-", "*", "/"]),
+                self.expression(Type::Vec3, d)
+            ),
             5 => format!("({} * {})", self.expression(Type::Vec3, d), self.expression(Type::Number, d)),
-            6 => format!("vec3({}, {}, {})", self.expression(Type::Float, d), self.float(0), self.expression(Type::Int, 0)),
+            6 => format!(
+                "vec3({}, {}, {})",
+                self.expression(Type::Float, d),
+                self.float(0),
+                self.expression(Type::Int, 0)
+            ),
             7 => format!("mix({}, {}, {})", self.vec3(0), self.expression(Type::Vec3, d), self.float(0)),
             8 => format!("normalize({})", self.expression(Type::Vec3, d)),
             9 => format!("cross({}, {})", self.expression(Type::Vec3, d), self.expression(Type::Vec3, d)),
@@ -649,7 +694,11 @@ impl Writer<'_> {
             13 => format!("hsv({}, saturate({}), {})", self.float(0), self.float(0), self.expression(Type::Float, d)),
             14 => format!("clamp({}, {}, {})", self.expression(Type::Vec3, d), self.float(0), self.vec3(0)),
             15 => format!("hash_color({})", self.expression(Type::Int, d)),
-            16 => format!("{}({})", self.pick(&["srgb", "hsv_from_rgb", "floor", "saturate"]), self.expression(Type::Vec3, d)),
+            16 => format!(
+                "{}({})",
+                self.pick(&["srgb", "hsv_from_rgb", "floor", "saturate"]),
+                self.expression(Type::Vec3, d)
+            ),
             17 => format!("gray({})", self.expression(Type::Number, d)),
             18 => {
                 let (t, a, b) = (self.expression(Type::Float, d), self.vec3(0), self.vec3(0));
@@ -662,14 +711,21 @@ impl Writer<'_> {
     fn vec4(&mut self, depth: usize) -> String {
         if depth == 0 {
             return match self.choose(3) {
-                0 if self.has_hit => self.pick(&["hit.tangent", "hit.color", "hit.texture(p.map)", "texture(p.map, hit.uv)"]).into(),
+                0 if self.has_hit => {
+                    self.pick(&["hit.tangent", "hit.color", "hit.texture(p.map)", "texture(p.map, hit.uv)"]).into()
+                }
                 1 => format!("vec4({}, {}, 0.5, 1)", self.float(0), self.float(0)),
                 _ => self.variable(Type::Vec4, false).unwrap_or_else(|| "vec4(0.25, -0.5, 1.0, 2.0)".into()),
             };
         }
         let d = depth - 1;
         match self.choose(5) {
-            0 | 1 => format!("({} {} {})", self.expression(Type::Vec4, d), self.pick(&["+", "-", "*", "/"]), self.expression(Type::Vec4, d)),
+            0 | 1 => format!(
+                "({} {} {})",
+                self.expression(Type::Vec4, d),
+                self.pick(&["+", "-", "*", "/"]),
+                self.expression(Type::Vec4, d)
+            ),
             2 => format!("vec4({}, {})", self.expression(Type::Vec3, d), self.float(0)),
             3 => format!("({} - {})", self.expression(Type::Vec4, d), self.expression(Type::Float, d)),
             _ => format!("normalize({})", self.expression(Type::Vec4, d)),

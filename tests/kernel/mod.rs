@@ -42,7 +42,9 @@ fn random_scripts_give_the_same_bits() {
                 *reasons.entry(what.to_owned()).or_default() += 1;
             }
             Ok(Verdict::Constant) => *reasons.entry("constant".into()).or_default() += 1,
-            Ok(Verdict::Refused(why)) => *reasons.entry(format!("refused: {}", why.lines().next().unwrap_or_default())).or_default() += 1,
+            Ok(Verdict::Refused(why)) => {
+                *reasons.entry(format!("refused: {}", why.lines().next().unwrap_or_default())).or_default() += 1
+            }
             Err(what) => failures.push((script.len(), format!("script {seed}: {what}\n{script}"))),
         }
     }

@@ -5,6 +5,7 @@ mod closures;
 mod errors;
 mod library;
 mod modules;
+mod native;
 mod reference;
 mod shading;
 mod shipped;

@@ -6,7 +6,9 @@ use super::args::BenchArguments;
 use super::load;
 use crate::cli::{Failure, print, terminal};
 use crate::diag::{Diagnostic, Diagnostics};
-use crate::shade::{Host, Mode, OutputBatch, OutputSet, ShadeErrors, Shaders, Shading, measure, synthetic};
+use crate::shade::{
+    Host, Mode, OutputBatch, OutputSet, ShadeErrors, Shaders, Shading, ShadingMode, measure, synthetic,
+};
 
 /// Measurements of which the median counts.
 const REPEATS: usize = 9;
@@ -85,6 +87,14 @@ fn bench(path: &std::path::Path, arguments: &BenchArguments) -> Result<(Mode, Ve
         Mode::Constant => {
             let one = synthetic::hits(1, 0);
             vec![Way::new("once", measure::nanoseconds_once(&scene, &shaders, material, &one, REPEATS))]
+        }
+        Mode::Kernel => {
+            let (reference, _) = Shaders::compile_for(&scene, &Host::new(), ShadingMode::Interpreter)?;
+            let mut interpreter = Shading::new(&scene, &reference);
+            vec![
+                Way::new("kernel", measure::nanoseconds_per_hit(&mut shading, material, &hits, REPEATS)),
+                Way::new("interpreter", measure::nanoseconds_per_hit(&mut interpreter, material, &hits, REPEATS)),
+            ]
         }
         Mode::Interpreted => {
             vec![Way::new("interpreter", measure::nanoseconds_per_hit(&mut shading, material, &hits, REPEATS))]

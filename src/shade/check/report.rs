@@ -62,6 +62,7 @@ impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.mode {
             Mode::Constant => writeln!(f, "  mode        constant: evaluated once")?,
+            Mode::Kernel => writeln!(f, "  mode        kernel")?,
             Mode::Interpreted => writeln!(f, "  mode        interpreted, at every hit")?,
         }
         if let Some(blame) = &self.blame {

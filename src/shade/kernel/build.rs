@@ -2,9 +2,7 @@
 
 use std::collections::HashMap;
 
-use super::ir::{
-    Block, BoolBinary, Carried, Code, Instruction, Item, Kind, Loop, Operand, Operands, Value, ValueType,
-};
+use super::ir::{Block, BoolBinary, Carried, Code, Instruction, Item, Kind, Loop, Operand, Operands, Value, ValueType};
 
 /// Values that a program may have: bounds compile time and memory.
 const MAX_VALUES: usize = 60_000;

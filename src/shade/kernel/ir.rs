@@ -16,7 +16,6 @@ use smallvec::SmallVec;
 
 use crate::math::portable;
 use crate::shade::library::math;
-use crate::shade::library::noise::Noise;
 
 /// A column that one instruction sets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -326,6 +325,17 @@ pub(in crate::shade) enum LightPart {
     Visibility,
 }
 
+/// A noise of the library.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(in crate::shade) enum Noise {
+    Value,
+    Gradient,
+    Cellular,
+    CellId,
+    /// So many layers of gradient noise.
+    Fbm(u8),
+}
+
 /// What an instruction does. Masks come last.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(in crate::shade) enum Code {
@@ -363,8 +373,12 @@ pub(in crate::shade) enum Code {
     HsvFromRgb,
     /// u, v → red, green, blue, alpha, by number in the kernel's table.
     Texture(u16),
-    /// A plug-in's function, by number in the kernel's table: its arguments' components, mask.
-    Native(u16),
+    /// A plug-in's function, by number in the kernel's table: its arguments' components, mask. It is called at hits in
+    /// the mask only.
+    Native {
+        function: u16,
+        can_fail: bool,
+    },
 }
 
 /// Operands of an instruction.
@@ -384,7 +398,10 @@ pub(in crate::shade) struct Instruction {
 pub(in crate::shade) enum Item {
     Set(Instruction),
     /// Runs the block if the guard is true at any hit.
-    If { guard: Operand, block: Block },
+    If {
+        guard: Operand,
+        block: Block,
+    },
     Loop(Box<Loop>),
     /// Hits in the mask fail: the interpreter will say why.
     Fail(Operand),
@@ -453,7 +470,8 @@ impl Block {
                     let names: Vec<_> = (0..u32::from(set.count)).map(|i| Value(set.first.0 + i).to_string()).collect();
                     let operands: Vec<_> = set.operands.iter().map(Operand::to_string).collect();
                     let uniform = if types[set.first.0 as usize].uniform { " uniform" } else { "" };
-                    let _ = writeln!(text, "{pad}{} ={uniform} {:?}({})", names.join(" "), set.code, operands.join(", "));
+                    let _ =
+                        writeln!(text, "{pad}{} ={uniform} {:?}({})", names.join(" "), set.code, operands.join(", "));
                 }
                 Item::If { guard, block } => {
                     let _ = writeln!(text, "{pad}if {guard}");

@@ -110,7 +110,8 @@ impl Kernel {
         let mut first = 0;
         while first < hits.len {
             let rows = run::CHUNK.min(hits.len - first);
-            let chunk = run::Chunk { hits, textures: &self.lowered.textures, first, rows };
+            let chunk =
+                run::Chunk { hits, textures: &self.lowered.textures, natives: &self.lowered.natives, first, rows };
             registers.run(&slice.program, self.lowered.fuel, &chunk);
             for (output, root) in &slice.outputs {
                 let output = &self.lowered.outputs[*output];

@@ -29,7 +29,9 @@ pub(super) fn append(
     };
     let color = |column: &mut Vec<Vec3>, default: Vec3| {
         let [x, y, z] = [float(0), float(1), float(2)];
-        column.extend((0..rows).map(|row| if has(row) { Vec3::new(x.row(row), y.row(row), z.row(row)) } else { default }));
+        column.extend(
+            (0..rows).map(|row| if has(row) { Vec3::new(x.row(row), y.row(row), z.row(row)) } else { default }),
+        );
     };
     let maybe_color = |column: &mut Vec<Option<Vec3>>| {
         let [x, y, z] = [float(0), float(1), float(2)];

@@ -7,17 +7,20 @@
 //! All of it is compiled for the widest vectors that the machine has (`pulp` chooses when the program runs). The
 //! instructions are the same on all machines, one IEEE operation each, and so are the bits.
 
+use smallvec::SmallVec;
+
 use super::ir::{
     BoolBinary, Code, Column, FloatBinaryLoop, FloatTernaryLoop, FloatUnaryLoop, IntBinaryLoop, IntCheckedLoop, Kind,
-    LightPart,
+    LightPart, Noise,
 };
 use super::lower::TextureUse;
 use super::slice::{CarriedRegisters, LoopSteps, Register, Runnable, Step};
 use crate::math::{Vec2, Vec3, Vec4};
 use crate::shade::batch::HitBatch;
-use crate::shade::library::noise::Noise;
+use crate::shade::library::batch::noise as batch;
 use crate::shade::library::{color, hash, hit, math};
 use crate::shade::names::PathKind;
+use crate::shade::native::{NativeFunction, NativeType, NativeValue};
 
 /// Rows of a block: what the widest vectors hold.
 pub(super) const LANES: usize = 16;
@@ -130,6 +133,7 @@ fn mask(x: bool) -> u32 {
 pub(super) struct Chunk<'a> {
     pub hits: &'a HitBatch,
     pub textures: &'a [TextureUse],
+    pub natives: &'a [NativeFunction],
     /// First row, and number of rows, at most [`CHUNK`].
     pub first: usize,
     pub rows: usize,
@@ -434,8 +438,9 @@ impl Registers {
             Code::Input(column, lane) => self.input(column, usize::from(lane), results[0], chunk),
             Code::Light(part) => self.light(part, operands[0], results[0], chunk),
             Code::Irradiance => self.irradiance(results, chunk),
-            // There are no plug-ins' functions yet.
-            Code::Native(_) => {}
+            Code::Native { function, .. } => {
+                self.native(&chunk.natives[usize::from(function)], operands, results, blocks, chunk);
+            }
         }
     }
 
@@ -452,7 +457,19 @@ impl Registers {
         let (x, y) = (self.floats.view(operands[0]), self.floats.view(operands[1]));
         let z = operands.get(2).map(|z| self.floats.view(*z));
         for (index, out) in out.iter_mut().enumerate() {
-            noise.block(x.block(index), y.block(index), z.map(|z| z.block(index)), &mut out.0);
+            let (x, y, out) = (x.block(index), y.block(index), &mut out.0);
+            match (noise, z.map(|z| z.block(index))) {
+                (Noise::Value, None) => batch::value_noise_2d(x, y, out),
+                (Noise::Value, Some(z)) => batch::value_noise_3d(x, y, z, out),
+                (Noise::Gradient, None) => batch::gradient_noise_2d(x, y, out),
+                (Noise::Gradient, Some(z)) => batch::gradient_noise_3d(x, y, z, out),
+                (Noise::Cellular, None) => batch::cellular_noise_2d(x, y, out),
+                (Noise::Cellular, Some(z)) => batch::cellular_noise_3d(x, y, z, out),
+                (Noise::CellId, None) => batch::cell_id_2d(x, y, out),
+                (Noise::CellId, Some(z)) => batch::cell_id_3d(x, y, z, out),
+                (Noise::Fbm(octaves), None) => batch::fbm_2d(x, y, octaves.into(), out),
+                (Noise::Fbm(octaves), Some(z)) => batch::fbm_3d(x, y, z, octaves.into(), out),
+            }
         }
     }
 
@@ -484,6 +501,92 @@ impl Registers {
         }
         for (register, out) in results.iter().zip(outs) {
             self.floats.put(*register, out);
+        }
+    }
+
+    /// Calls a plug-in's function: its batch form, or else its scalar form at each hit in the mask.
+    fn native(
+        &mut self,
+        native: &NativeFunction,
+        operands: &[Register],
+        results: &[Register],
+        blocks: usize,
+        chunk: &Chunk<'_>,
+    ) {
+        let Some((live, operands)) = operands.split_last() else { return };
+        if let Some(batch) = native.batch() {
+            let columns: Vec<Vec<f32>> = operands
+                .iter()
+                .map(|operand| (0..blocks * LANES).map(|row| self.floats.view(*operand).row(row)).collect())
+                .collect();
+            let columns: Vec<&[f32]> = columns.iter().map(Vec::as_slice).collect();
+            let mut given = vec![vec![0.0; blocks * LANES]; results.len()];
+            batch(&columns, &mut given.iter_mut().map(Vec::as_mut_slice).collect::<Vec<_>>());
+            for (register, given) in results.iter().zip(given) {
+                let column = &mut self.floats.columns[usize::from(register.index)];
+                for (row, x) in given.into_iter().enumerate() {
+                    column[row / LANES].0[row % LANES] = x;
+                }
+            }
+            return;
+        }
+        let uniform = results[0].uniform;
+        let rows = if uniform { 1 } else { blocks * LANES };
+        for row in 0..rows {
+            let is_live = if uniform { self.any(*live, chunk.blocks()) } else { self.bools.view(*live).row(row) != 0 };
+            if !is_live {
+                continue;
+            }
+            let mut rest = operands;
+            let arguments: SmallVec<[NativeValue; 6]> =
+                native.parameters().iter().map(|wanted| self.argument(*wanted, &mut rest, row)).collect();
+            match native.call(&arguments) {
+                Ok(value) => self.put_native(value, results, row),
+                Err(_) if uniform => self.fail(*live, chunk.blocks()),
+                Err(_) => self.failed[row / LANES].0[row % LANES] = u32::MAX,
+            }
+        }
+    }
+
+    /// An argument of a type, from the first of the operands, which it takes away.
+    fn argument(&self, wanted: NativeType, operands: &mut &[Register], row: usize) -> NativeValue {
+        let count = wanted.columns().unwrap_or(1).min(operands.len());
+        let (own, rest) = operands.split_at(count);
+        *operands = rest;
+        let float = |i: usize| own.get(i).map_or(0.0, |operand| self.floats.view(*operand).row(row));
+        match wanted {
+            NativeType::Float => NativeValue::Float(float(0)),
+            NativeType::Vec2 => NativeValue::Vec2(Vec2::new(float(0), float(1))),
+            NativeType::Vec3 => NativeValue::Vec3(Vec3::new(float(0), float(1), float(2))),
+            NativeType::Vec4 => NativeValue::Vec4(Vec4::new(float(0), float(1), float(2), float(3))),
+            NativeType::Int => NativeValue::Int(own.first().map_or(0, |operand| self.ints.view(*operand).row(row))),
+            NativeType::Bool => {
+                NativeValue::Bool(own.first().is_some_and(|operand| self.bools.view(*operand).row(row) != 0))
+            }
+        }
+    }
+
+    fn put_native(&mut self, value: NativeValue, results: &[Register], row: usize) {
+        let (block, lane) = (row / LANES, row % LANES);
+        let mut put = |channels: &[f32]| {
+            for (register, x) in results.iter().zip(channels) {
+                let column = &mut self.floats.columns[usize::from(register.index)];
+                if register.uniform {
+                    column[0] = Block([*x; LANES]);
+                } else {
+                    column[block].0[lane] = *x;
+                }
+            }
+        };
+        match value {
+            NativeValue::Float(x) => put(&[x]),
+            NativeValue::Vec2(v) => put(&v.to_array()),
+            NativeValue::Vec3(v) => put(&v.to_array()),
+            NativeValue::Vec4(v) => put(&v.to_array()),
+            NativeValue::Int(x) if results[0].uniform => self.ints.set(results[0].index, x),
+            NativeValue::Int(x) => self.ints.columns[usize::from(results[0].index)][block].0[lane] = x,
+            NativeValue::Bool(x) if results[0].uniform => self.bools.set(results[0].index, mask(x)),
+            NativeValue::Bool(x) => self.bools.columns[usize::from(results[0].index)][block].0[lane] = mask(x),
         }
     }
 

@@ -9,8 +9,10 @@ use std::collections::HashMap;
 
 use smallvec::SmallVec;
 
-use super::ir::{Block, Carried, Code, Column, FloatBinary, FloatUnary, Instruction, Item, Kind, Loop, Operand, Value, ValueType};
-use crate::shade::library::noise::Noise;
+use super::ir::{
+    Block, Carried, Code, Column, FloatBinary, FloatUnary, Instruction, Item, Kind, Loop, Noise, Operand, Value,
+    ValueType,
+};
 use crate::shade::names::InputSet;
 
 /// A branch whose instructions cost less than this is taken apart.
@@ -105,7 +107,8 @@ fn mark(needed: &mut [bool], operand: Operand) -> bool {
 /// Whether an instruction can make hits fail.
 fn may_fail(instruction: &Instruction) -> bool {
     match instruction.code {
-        Code::Checked(_) | Code::IntFromFloat | Code::Native(_) => instruction.operands.last() != Some(&Operand::FALSE),
+        Code::Checked(_) | Code::IntFromFloat => instruction.operands.last() != Some(&Operand::FALSE),
+        Code::Native { can_fail, .. } => can_fail,
         _ => false,
     }
 }
@@ -207,7 +210,7 @@ fn short_cost(item: &Item) -> Option<u32> {
         ) => 1,
         Code::Float1(_) => 30,
         Code::Noise(Noise::Fbm(octaves)) => 60 * u32::from(octaves),
-        Code::Noise(_) | Code::Texture(_) | Code::Native(_) | Code::Light(_) | Code::Irradiance => 60,
+        Code::Noise(_) | Code::Texture(_) | Code::Native { .. } | Code::Light(_) | Code::Irradiance => 60,
         Code::HashFloats(_) | Code::HashInt(_) | Code::RgbFromHsv | Code::HsvFromRgb => 15,
         _ => 1,
     })
@@ -432,8 +435,7 @@ impl<'a> Allocation<'a> {
                 Item::Loop(round) => {
                     let starts: Vec<Register> =
                         round.carried.iter().map(|carried| self.register(carried.start)).collect();
-                    let values: Vec<Register> =
-                        round.carried.iter().map(|carried| self.give(carried.value)).collect();
+                    let values: Vec<Register> = round.carried.iter().map(|carried| self.give(carried.value)).collect();
                     let inner = self.steps(&round.block);
                     self.place += 1;
                     let again = self.register(round.again);
@@ -442,9 +444,10 @@ impl<'a> Allocation<'a> {
                         CarriedRegisters { kind, value, start, next: self.register(carried.next) }
                     });
                     let carried = carried.collect();
-                    let read = round.carried.iter().flat_map(|carried| {
-                        [carried.start, carried.next, Operand::Value(carried.value)]
-                    });
+                    let read = round
+                        .carried
+                        .iter()
+                        .flat_map(|carried| [carried.start, carried.next, Operand::Value(carried.value)]);
                     self.free(read.chain([round.again]));
                     // Values from outside that the block reads last in its own midst were kept until here.
                     let mut inside = Vec::new();
@@ -506,7 +509,9 @@ impl Runnable {
 /// counted, too.
 fn any_fails(steps: &[Step]) -> bool {
     steps.iter().any(|step| match step {
-        Step::Set { code, .. } => matches!(code, Code::Checked(_) | Code::IntFromFloat | Code::Native(_)),
+        Step::Set { code, .. } => {
+            matches!(code, Code::Checked(_) | Code::IntFromFloat | Code::Native { can_fail: true, .. })
+        }
         Step::If { steps, .. } => any_fails(steps),
         Step::Loop(_) | Step::Fail(_) => true,
     })

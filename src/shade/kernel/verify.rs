@@ -103,7 +103,7 @@ fn check(instruction: &Instruction, types: &[ValueType]) -> Result<(), String> {
         Code::IntFromFloat => &[Float, Bool],
         Code::HashFloats(_) => &[Float, Float, Float, Float][..instruction.operands.len().min(4)],
         Code::Noise(_) => &[Float, Float, Float][..instruction.operands.len().clamp(2, 3)],
-        Code::Native(_) => return Ok(()),
+        Code::Native { .. } => return Ok(()),
     };
     let found: Vec<Kind> = instruction.operands.iter().map(|operand| kind(*operand, types)).collect();
     if found != wanted {

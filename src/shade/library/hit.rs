@@ -105,9 +105,9 @@ impl Hit {
 /// What all lights together give a surface with this normal.
 #[inline(always)]
 pub(in crate::shade) fn irradiance(normal: Vec3, lights: &[LightSample]) -> Vec3 {
-    lights.iter().fold(Vec3::ZERO, |sum, light| {
-        sum + light.radiance * light.visibility * max(0.0, dot(normal, light.direction))
-    })
+    lights
+        .iter()
+        .fold(Vec3::ZERO, |sum, light| sum + light.radiance * light.visibility * max(0.0, dot(normal, light.direction)))
 }
 
 /// A hit was asked for what its batch does not hold: the analysis missed that the script reads it.

@@ -6,6 +6,7 @@
 //!
 //! Wherever a number is expected, a script may write `1` or `1.0`; an int counts as the nearest float.
 
+pub mod batch;
 pub(in crate::shade) mod color;
 mod compare;
 pub(in crate::shade) mod fractal;
@@ -36,21 +37,21 @@ pub(super) use texture::{texture_name, texture_of, unwritten_path};
 
 /// A function of the library, for messages and reference pages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Function {
+pub struct Function<'a> {
     /// Its name.
-    pub name: &'static str,
+    pub name: &'a str,
     /// How it is called.
-    pub form: &'static str,
+    pub form: &'a str,
     /// What it gives.
-    pub about: &'static str,
+    pub about: &'a str,
     /// Types and ranges of what it takes, `→`, type and range of what it gives.
-    pub types: &'static str,
+    pub types: &'a str,
     /// An expression in a `surface(hit, p)` that uses it; a number, a vec3, an int, or true or false.
-    pub example: &'static str,
+    pub example: &'a str,
 }
 
 /// All functions of the library, by subject.
-pub fn functions() -> impl Iterator<Item = Function> + Clone {
+pub fn functions() -> impl Iterator<Item = Function<'static>> + Clone {
     [
         vectors::FUNCTIONS,
         math::FUNCTIONS,

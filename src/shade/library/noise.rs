@@ -52,7 +52,13 @@ pub(super) const FUNCTIONS: &[Function] = &[
 ];
 
 const LIMIT: f32 = 1_048_576.0;
-const MAX_OCTAVES: i64 = 10;
+/// The most octaves of [`fbm`].
+pub(in crate::shade) const MAX_OCTAVES: i64 = 10;
+
+static VALUE: LazyLock<FastNoiseLite> = LazyLock::new(|| noise(NoiseType::Value));
+static GRADIENT: LazyLock<FastNoiseLite> = LazyLock::new(|| noise(NoiseType::Perlin));
+static DISTANCE: LazyLock<FastNoiseLite> = LazyLock::new(|| cells(CellularReturnType::Distance));
+static ID: LazyLock<FastNoiseLite> = LazyLock::new(|| cells(CellularReturnType::CellValue));
 
 fn noise(kind: NoiseType) -> FastNoiseLite {
     let mut noise = FastNoiseLite::new();
@@ -68,91 +74,68 @@ fn cells(given: CellularReturnType) -> FastNoiseLite {
     noise
 }
 
-/// A noise of the library.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub(in crate::shade) enum Noise {
-    Value,
-    Gradient,
-    Cellular,
-    CellId,
-    /// So many layers of gradient noise, 1 to 10.
-    Fbm(u8),
-}
-
-struct Generators {
-    value: FastNoiseLite,
-    gradient: FastNoiseLite,
-    distance: FastNoiseLite,
-    id: FastNoiseLite,
-    layered: Vec<FastNoiseLite>,
-}
-
-static GENERATORS: LazyLock<Generators> = LazyLock::new(|| Generators {
-    value: noise(NoiseType::Value),
-    gradient: noise(NoiseType::Perlin),
-    distance: cells(CellularReturnType::Distance),
-    id: cells(CellularReturnType::CellValue),
-    layered: (1..=MAX_OCTAVES)
-        .map(|octaves| {
-            let mut layered = noise(NoiseType::Perlin);
-            layered.set_fractal_type(Some(FractalType::FBm));
-            layered.set_fractal_octaves(i32::try_from(octaves).ok());
-            layered
-        })
-        .collect(),
-});
-
-impl Noise {
-    /// The noise at a point of two or three coordinates.
-    pub fn at(self, x: f32, y: f32, z: Option<f32>) -> f32 {
-        let [x, y] = [x, y].map(|x| clamp(x, -LIMIT, LIMIT));
-        let z = z.map(|z| clamp(z, -LIMIT, LIMIT));
-        if x.is_nan() || y.is_nan() || z.is_some_and(f32::is_nan) {
-            return f32::NAN;
-        }
-        let get = |noise: &FastNoiseLite| match z {
-            None => noise.get_noise_2d(x, y),
-            Some(z) => noise.get_noise_3d(x, y, z),
-        };
-        let all = &*GENERATORS;
-        match self {
-            Self::Value => 0.5 + 0.5 * get(&all.value),
-            Self::Gradient => get(&all.gradient),
-            // The source gives the distance less 1.
-            Self::Cellular => get(&all.distance) + 1.0,
-            Self::CellId => 0.5 + 0.5 * get(&all.id),
-            Self::Fbm(octaves) => get(&all.layered[usize::from(octaves).clamp(1, all.layered.len()) - 1]),
-        }
+/// The noise at a point of two or three coordinates.
+fn at<const N: usize>(noise: &FastNoiseLite, point: [f32; N]) -> f32 {
+    let point = point.map(|x| clamp(x, -LIMIT, LIMIT));
+    if point.iter().any(|x| x.is_nan()) {
+        return f32::NAN;
     }
-
-    /// The noise at many points.
-    #[inline(always)]
-    pub fn block<const N: usize>(self, x: &[f32; N], y: &[f32; N], z: Option<&[f32; N]>, out: &mut [f32; N]) {
-        for lane in 0..N {
-            out[lane] = self.at(x[lane], y[lane], z.map(|z| z[lane]));
-        }
+    match point.as_slice() {
+        [x, y] => noise.get_noise_2d(*x, *y),
+        [x, y, z] => noise.get_noise_3d(*x, *y, *z),
+        _ => f32::NAN,
     }
 }
 
-fn sample(name: &str, noise: Noise, point: Dynamic) -> Outcome<f32> {
+/// Value noise, 0 … 1.
+pub(super) fn value_noise<const N: usize>(point: [f32; N]) -> f32 {
+    0.5 + 0.5 * at(&VALUE, point)
+}
+
+/// Perlin noise, −1 … 1.
+pub(super) fn gradient_noise<const N: usize>(point: [f32; N]) -> f32 {
+    at(&GRADIENT, point)
+}
+
+/// The distance to the nearest scattered point. The source gives it less 1.
+pub(super) fn cellular_noise<const N: usize>(point: [f32; N]) -> f32 {
+    at(&DISTANCE, point) + 1.0
+}
+
+/// The number of the nearest scattered point, 0 … 1.
+pub(super) fn cell_id<const N: usize>(point: [f32; N]) -> f32 {
+    0.5 + 0.5 * at(&ID, point)
+}
+
+/// Perlin noise over 1 to [`MAX_OCTAVES`] octaves.
+pub(super) fn fbm<const N: usize>(point: [f32; N], octaves: i64) -> f32 {
+    let mut layered = noise(NoiseType::Perlin);
+    layered.set_fractal_type(Some(FractalType::FBm));
+    layered.set_fractal_octaves(i32::try_from(octaves).ok());
+    at(&layered, point)
+}
+
+fn register_kind(engine: &mut Engine, name: &'static str, flat: fn([f32; 2]) -> f32, solid: fn([f32; 3]) -> f32) {
+    engine.register_fn(name, move |point: Dynamic| sample(name, point, flat, solid));
+}
+
+fn sample(name: &str, point: Dynamic, flat: impl Fn([f32; 2]) -> f32, solid: impl Fn([f32; 3]) -> f32) -> Outcome<f32> {
     match Operand::of(&point) {
-        Some(Operand::Vec2(v)) => Ok(noise.at(v.x, v.y, None)),
-        Some(Operand::Vec3(v)) => Ok(noise.at(v.x, v.y, Some(v.z))),
+        Some(Operand::Vec2(v)) => Ok(flat(v.into())),
+        Some(Operand::Vec3(v)) => Ok(solid(v.into())),
         _ => Err(refuse(name, &[point])),
     }
 }
 
 pub(super) fn register(engine: &mut Engine) {
-    for (name, noise) in [
-        ("value_noise", Noise::Value),
-        ("gradient_noise", Noise::Gradient),
-        ("cellular_noise", Noise::Cellular),
-        ("cell_id", Noise::CellId),
-    ] {
-        engine.register_fn(name, move |point: Dynamic| sample(name, noise, point));
-    }
-    engine.register_fn("fbm", |point: Dynamic, octaves: i64| match u8::try_from(octaves) {
-        Ok(layers) if (1..=MAX_OCTAVES).contains(&octaves) => sample("fbm", Noise::Fbm(layers), point),
-        _ => Err(Fault::new(format!("`fbm` takes 1 to {MAX_OCTAVES} octaves, not {octaves}")).into()),
+    register_kind(engine, "value_noise", value_noise, value_noise);
+    register_kind(engine, "gradient_noise", gradient_noise, gradient_noise);
+    register_kind(engine, "cellular_noise", cellular_noise, cellular_noise);
+    register_kind(engine, "cell_id", cell_id, cell_id);
+    engine.register_fn("fbm", |point: Dynamic, octaves: i64| {
+        if !(1..=MAX_OCTAVES).contains(&octaves) {
+            return Err(Fault::new(format!("`fbm` takes 1 to {MAX_OCTAVES} octaves, not {octaves}")).into());
+        }
+        sample("fbm", point, |p| fbm(p, octaves), |p| fbm(p, octaves))
     });
 }

@@ -277,7 +277,13 @@ impl Lowerer<'_> {
         }
     }
 
-    fn with_channels(&mut self, channels: &Channels, to: &[usize], item: &Meaning, position: Position) -> Flow<Meaning> {
+    fn with_channels(
+        &mut self,
+        channels: &Channels,
+        to: &[usize],
+        item: &Meaning,
+        position: Position,
+    ) -> Flow<Meaning> {
         let mut channels = channels.clone();
         let mut sorted = to.to_vec();
         sorted.sort_unstable();

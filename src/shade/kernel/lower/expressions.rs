@@ -133,11 +133,7 @@ impl Lowerer<'_> {
             return Ok(Meaning::Bool(first));
         }
         let decided = if decisive { first } else { self.builder.not(first) };
-        let value = self.branch(
-            decided,
-            |_| Ok(Meaning::bool(decisive)),
-            |lowerer| lowerer.logic(others, decisive),
-        )?;
+        let value = self.branch(decided, |_| Ok(Meaning::bool(decisive)), |lowerer| lowerer.logic(others, decisive))?;
         Ok(value)
     }
 

@@ -5,13 +5,13 @@ use std::rc::Rc;
 use rhai::Position;
 
 use super::super::ir::{
-    Code, Column, Comparison, FloatBinary, FloatTernary, FloatUnary, IntBinary, IntChecked, Kind, LightPart,
+    Code, Column, Comparison, FloatBinary, FloatTernary, FloatUnary, IntBinary, IntChecked, Kind, LightPart, Noise,
     Operand,
 };
 use super::meaning::{Channels, Meaning};
 use super::{Flow, Lowerer};
 use crate::scene::texture::TextureFilter;
-use crate::shade::library::noise::Noise;
+use crate::shade::native::NativeType;
 
 impl Lowerer<'_> {
     /// A call of a function that the script does not define, or an operator.
@@ -70,7 +70,8 @@ impl Lowerer<'_> {
                 .or_else(|| self.of_ints(name, arguments))
                 .or_else(|| self.channelwise(name, arguments))
                 .or_else(|| self.geometry(name, arguments))
-                .or_else(|| self.other(name, arguments))),
+                .or_else(|| self.other(name, arguments))
+                .or_else(|| self.plug_in(name, arguments))),
         }
     }
 
@@ -85,6 +86,44 @@ impl Lowerer<'_> {
             }
             _ => return None,
         }))
+    }
+
+    /// A function that a plug-in has added.
+    fn plug_in(&mut self, name: &str, arguments: &[Meaning]) -> Option<Meaning> {
+        let native = self.surroundings.natives.iter().find(|native| native.name() == name)?;
+        if native.parameters().len() != arguments.len() {
+            return None;
+        }
+        let mut operands: Vec<Operand> = Vec::new();
+        for (argument, wanted) in arguments.iter().zip(native.parameters()) {
+            match (argument, wanted) {
+                (Meaning::Bool(x), NativeType::Bool) | (Meaning::Int(x), NativeType::Int) => operands.push(*x),
+                (number, NativeType::Float) => operands.push(self.number(number)?),
+                (Meaning::Vector(channels), wanted) if wanted.columns() == Some(channels.len()) => {
+                    operands.extend_from_slice(channels);
+                }
+                _ => return None,
+            }
+        }
+        operands.push(self.mask());
+        let can_fail = native.can_fail();
+        self.natives.push(native.clone());
+        let function = u16::try_from(self.natives.len() - 1).ok()?;
+        let code = Code::Native { function, can_fail };
+        let kind = match native.result() {
+            NativeType::Bool => Kind::Bool,
+            NativeType::Int => Kind::Int,
+            _ => Kind::Float,
+        };
+        let count = native.result().columns().unwrap_or(1);
+        let first = self.builder.emit_many(code, &operands, &vec![kind; count]);
+        let channel = |i: usize| Operand::Value(super::super::ir::Value(first.0 + i as u32));
+        Some(match native.result() {
+            NativeType::Bool => Meaning::Bool(channel(0)),
+            NativeType::Int => Meaning::Int(channel(0)),
+            NativeType::Float => Meaning::Float(channel(0)),
+            _ => Meaning::Vector((0..count).map(channel).collect()),
+        })
     }
 
     // Inputs.
@@ -218,10 +257,8 @@ impl Lowerer<'_> {
 
     /// What gives an int if all arguments are ints.
     fn of_ints(&mut self, name: &str, arguments: &[Meaning]) -> Option<Meaning> {
-        let ints: Option<Vec<Operand>> = arguments
-            .iter()
-            .map(|argument| if let Meaning::Int(x) = argument { Some(*x) } else { None })
-            .collect();
+        let ints: Option<Vec<Operand>> =
+            arguments.iter().map(|argument| if let Meaning::Int(x) = argument { Some(*x) } else { None }).collect();
         let ints = ints?;
         let mut plain = |code, a, b| self.builder.emit(Code::Int2(code), &[a, b]);
         Some(Meaning::Int(match (name, ints.as_slice()) {
@@ -396,7 +433,8 @@ impl Lowerer<'_> {
 
     /// The sum of the products of the channels, in order.
     fn dot(&mut self, a: &Channels, b: &Channels) -> Operand {
-        let mut products = a.iter().zip(b).map(|(a, b)| self.builder.emit(Code::Float2(FloatBinary::Multiply), &[*a, *b]));
+        let mut products =
+            a.iter().zip(b).map(|(a, b)| self.builder.emit(Code::Float2(FloatBinary::Multiply), &[*a, *b]));
         let products: Channels = products.by_ref().collect();
         let (first, others) = (products[0], &products[1..]);
         others.iter().fold(first, |sum, product| self.float2(FloatBinary::Add, sum, *product))
@@ -510,10 +548,8 @@ impl Lowerer<'_> {
         let share = match kind {
             "constant" => zero,
             "linear" => {
-                let (along, whole) = (
-                    self.float2(FloatBinary::Subtract, t, low),
-                    self.float2(FloatBinary::Subtract, high, low),
-                );
+                let (along, whole) =
+                    (self.float2(FloatBinary::Subtract, t, low), self.float2(FloatBinary::Subtract, high, low));
                 let share = self.float2(FloatBinary::Divide, along, whole);
                 self.builder.select(within, share, zero)
             }

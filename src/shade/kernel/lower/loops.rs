@@ -257,8 +257,7 @@ impl<'a> Lowerer<'a> {
             }
             let then = self.cells[kept + index].meaning.clone();
             let now = self.cells[index].meaning.clone();
-            self.cells[index].meaning =
-                if self.is_dead() { then } else { self.builder.join(gone, &then, &now) };
+            self.cells[index].meaning = if self.is_dead() { then } else { self.builder.join(gone, &then, &now) };
         }
         self.live = Some(match self.live {
             Some(live) => self.builder.or(live, gone),
@@ -285,7 +284,12 @@ impl<'a> Lowerer<'a> {
 
     /// Makes the innermost loop a loop of the program. Its body is walked again and again, until it is known which
     /// variables it changes, and which of them differ from hit to hit.
-    fn dynamic(&mut self, counter: Option<Counter>, round: Round<'_, 'a>, position: Position) -> Flow<Option<Obstacle>> {
+    fn dynamic(
+        &mut self,
+        counter: Option<Counter>,
+        round: Round<'_, 'a>,
+        position: Position,
+    ) -> Flow<Option<Obstacle>> {
         let Some((outside, broken, value, at_break, continued, at_continue)) = self.innermost() else {
             return Ok(None);
         };
@@ -296,9 +300,7 @@ impl<'a> Lowerer<'a> {
         let mut carried: BTreeSet<usize> = BTreeSet::new();
         let mut varying: BTreeSet<usize> = BTreeSet::new();
         let mut live_varies = !self.builder.is_uniform(entry_live);
-        let mut counter_varies = counter.is_some_and(|counter| {
-            !self.builder.is_uniform(counter.range.low)
-        });
+        let mut counter_varies = counter.is_some_and(|counter| !self.builder.is_uniform(counter.range.low));
         let cost_before = self.cost;
         for _ in 0..MAX_ATTEMPTS {
             let mark = self.builder.mark();
@@ -401,7 +403,11 @@ impl<'a> Lowerer<'a> {
                     return Ok(Some(Obstacle::Form(what)));
                 }
                 settled &= !carried.insert(index);
-                let varies = next.operands().iter().chain(&start[index].meaning.operands()).any(|o| !self.builder.is_uniform(*o));
+                let varies = next
+                    .operands()
+                    .iter()
+                    .chain(&start[index].meaning.operands())
+                    .any(|o| !self.builder.is_uniform(*o));
                 if varies {
                     settled &= !varying.insert(index);
                 }

@@ -72,7 +72,10 @@ pub(in crate::shade::kernel) struct Closure {
 #[derive(Clone, Debug, PartialEq)]
 pub(in crate::shade::kernel) enum Captured {
     /// A variable, shared with the surroundings.
-    Variable { cell: usize, identity: u64 },
+    Variable {
+        cell: usize,
+        identity: u64,
+    },
     Value(Meaning),
 }
 

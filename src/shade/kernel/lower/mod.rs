@@ -30,11 +30,11 @@ use rhai::Position;
 use self::meaning::{Channels, Field, Meaning, Record};
 use super::build::Builder;
 use super::ir::{Block, Code, Comparison, Item, Operand, ValueType};
-use crate::math::Affine2;
 use crate::scene::texture::{Texture, TextureRef};
 use crate::shade::analysis::Finding;
 use crate::shade::host::{MAX_CALL_DEPTH, MAX_OPERATIONS};
 use crate::shade::names::{AOV_PREFIX, OutputForm, OutputSet};
+use crate::shade::native::NativeFunction;
 use crate::shade::params::{Params, Value};
 use crate::shade::script::{Functions, Program, ScriptFunction};
 
@@ -96,6 +96,8 @@ pub(in crate::shade) struct Surroundings<'a> {
     pub textures: &'a [Arc<Texture>],
     /// Material number, from 1, as `hit.material_id`.
     pub material_id: u32,
+    /// Functions that plug-ins have added.
+    pub natives: &'a [NativeFunction],
     /// Lights in the scene; `None` if the same kernel must serve any number.
     pub light_count: Option<usize>,
 }
@@ -115,6 +117,7 @@ pub(super) struct Lowered {
     /// What the record that `surface` returns holds.
     pub outputs: Vec<LoweredOutput>,
     pub textures: Vec<TextureUse>,
+    pub natives: Vec<NativeFunction>,
     /// What loops may cost in the interpreter's operations before their hits are given to it.
     pub fuel: u64,
 }
@@ -146,6 +149,7 @@ pub(super) fn lower(program: &Program, params: &Params, surroundings: Surroundin
         functions,
         surroundings,
         textures: Vec::new(),
+        natives: Vec::new(),
         cells: Vec::new(),
         live: Some(Operand::TRUE),
         frames: Vec::new(),
@@ -174,9 +178,9 @@ pub(super) fn lower(program: &Program, params: &Params, surroundings: Surroundin
     if fuel == 0 {
         return Err(lowerer.blame(Position::NONE, "the sheer number of operations"));
     }
-    let textures = std::mem::take(&mut lowerer.textures);
+    let (textures, natives) = (std::mem::take(&mut lowerer.textures), std::mem::take(&mut lowerer.natives));
     let (block, types) = lowerer.builder.finish();
-    Ok(Lowered { block, types, outputs, textures, fuel })
+    Ok(Lowered { block, types, outputs, textures, natives, fuel })
 }
 
 /// The state of the walk.
@@ -185,6 +189,7 @@ struct Lowerer<'a> {
     functions: &'a Functions,
     surroundings: Surroundings<'a>,
     textures: Vec<TextureUse>,
+    natives: Vec<NativeFunction>,
     cells: Vec<Cell>,
     /// At which hits control is here; `None` if at none.
     live: Option<Operand>,
@@ -406,8 +411,7 @@ impl Lowerer<'_> {
             return self.give_up(position, "a call nested this deep");
         }
         let cells = self.cells.len();
-        let (returned, result) =
-            (self.new_cell(Meaning::bool(false), true), self.new_cell(Meaning::Undefined, true));
+        let (returned, result) = (self.new_cell(Meaning::bool(false), true), self.new_cell(Meaning::Undefined, true));
         let entry = self.live;
         // Closures are called within their own file.
         let outer = self.frames.last().map_or(function.file, |frame| frame.file);
@@ -524,14 +528,7 @@ impl Lowerer<'_> {
     }
 
     /// An exit cell after a choice. At hits that were live on neither side it stays what it was.
-    fn join_exit(
-        &mut self,
-        uniform: bool,
-        guards: [Operand; 2],
-        a: &Meaning,
-        b: &Meaning,
-        index: usize,
-    ) -> Meaning {
+    fn join_exit(&mut self, uniform: bool, guards: [Operand; 2], a: &Meaning, b: &Meaning, index: usize) -> Meaning {
         if a == b {
             return a.clone();
         }
@@ -576,9 +573,4 @@ impl Lowerer<'_> {
         }
         Ok(value)
     }
-}
-
-/// A use of a texture without a transform, on the first uv set.
-pub(super) fn plain_place(texture: crate::scene::ids::TextureId) -> TextureRef {
-    TextureRef { texture, uv_set: 0, transform: Affine2::IDENTITY }
 }

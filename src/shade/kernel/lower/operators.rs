@@ -2,9 +2,7 @@
 
 use rhai::Position;
 
-use super::super::ir::{
-    BoolBinary, Code, Comparison, FloatBinary, FloatUnary, IntBinary, IntChecked, Operand,
-};
+use super::super::ir::{BoolBinary, Code, Comparison, FloatBinary, FloatUnary, IntBinary, IntChecked, Operand};
 use super::meaning::{Channels, Meaning, Range};
 use super::{Flow, Lowerer};
 use crate::shade::PathKind;

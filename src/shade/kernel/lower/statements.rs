@@ -182,7 +182,9 @@ impl Lowerer<'_> {
                 let (a, b) = (self.same(&sides[0], value, position)?, self.same(&sides[1], value, position)?);
                 Ok(self.builder.select(*mask, a, b))
             }
-            (Meaning::Int(a), Meaning::Int(b)) => Ok(self.builder.emit(Code::CompareInts(Comparison::Equal), &[*a, *b])),
+            (Meaning::Int(a), Meaning::Int(b)) => {
+                Ok(self.builder.emit(Code::CompareInts(Comparison::Equal), &[*a, *b]))
+            }
             (Meaning::Bool(a), Meaning::Bool(b)) => {
                 let differ = self.builder.emit(Code::Bool2(BoolBinary::Xor), &[*a, *b]);
                 Ok(self.builder.not(differ))
