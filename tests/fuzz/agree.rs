@@ -127,6 +127,7 @@ fn scene(script: &str) -> Scene {
         image: Arc::new(Image { width: 4, height: 3, pixels: Pixels::Rgba8 { data, srgb: true } }),
         wrap: [Wrap::Repeat, Wrap::Mirror],
         filter: TextureFilter::Linear,
+        levels: Default::default(),
     });
     let script_id = builder.add_script(Script { source: Source::new("random.rhai", script), path: None });
     let mut params = BTreeMap::new();
