@@ -689,7 +689,7 @@ impl Writer<'_> {
             };
         }
         let d = depth - 1;
-        match self.choose(20) {
+        match self.choose(24) {
             0..=4 => format!(
                 "({} {} {})",
                 self.expression(Type::Vec3, d),

@@ -143,10 +143,3 @@ impl Kernel {
         text
     }
 }
-
-impl Slice {
-    /// Instructions, those in loops and branches once.
-    pub fn instructions(&self) -> usize {
-        self.program.instructions
-    }
-}

@@ -210,10 +210,7 @@ impl Registers {
                 Step::Set { code, operands, results } => {
                     let blocks = if results[0].uniform { 1 } else { chunk.blocks() };
                     let arch = self.arch;
-                    arch.dispatch(
-                        #[inline(always)]
-                        || self.set(*code, operands, results, blocks, chunk),
-                    );
+                    arch.dispatch(Instruction { registers: self, code: *code, operands, results, blocks, chunk });
                 }
                 Step::If { guard, steps } => {
                     if self.any(*guard, chunk.blocks()) {
@@ -677,6 +674,26 @@ impl Registers {
         for (register, out) in results.iter().zip(outs) {
             self.floats.put(*register, out);
         }
+    }
+}
+
+/// An instruction about to be run. (A closure would do, but closures are not always inlined into the function that is
+/// compiled for wide vectors, and then are not compiled for them.)
+struct Instruction<'a> {
+    registers: &'a mut Registers,
+    code: Code,
+    operands: &'a [Register],
+    results: &'a [Register],
+    blocks: usize,
+    chunk: &'a Chunk<'a>,
+}
+
+impl pulp::WithSimd for Instruction<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) {
+        self.registers.set(self.code, self.operands, self.results, self.blocks, self.chunk);
     }
 }
 

@@ -79,8 +79,6 @@ pub(super) struct Runnable {
     pub bools: BankSize<bool>,
     /// Registers of the roots, in order.
     pub roots: Vec<Register>,
-    /// Instructions, in blocks and loops too.
-    pub instructions: usize,
 }
 
 /// Cuts the slice of a program that the roots need, and gives it registers.
@@ -249,7 +247,6 @@ struct Allocation<'a> {
     pools: [Pool; 3],
     registers: HashMap<Value, u16>,
     place: u32,
-    instructions: usize,
 }
 
 fn number(kind: Kind) -> usize {
@@ -268,7 +265,6 @@ impl<'a> Allocation<'a> {
             pools: Default::default(),
             registers: HashMap::new(),
             place: 0,
-            instructions: 0,
         }
     }
 
@@ -369,7 +365,6 @@ impl<'a> Allocation<'a> {
             bools: bank(bools, Operand::as_bool),
             steps,
             roots,
-            instructions: self.instructions,
         }
     }
 
@@ -423,7 +418,6 @@ impl<'a> Allocation<'a> {
             self.place += 1;
             match item {
                 Item::Set(set) => {
-                    self.instructions += 1;
                     let operands: Registers = set.operands.iter().map(|operand| self.register(*operand)).collect();
                     // Results never share a register with an operand: a loop reads one while it writes the other.
                     let values = results(set).map(|index| Value(index as u32));
