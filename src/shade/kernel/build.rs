@@ -119,7 +119,7 @@ impl Builder {
         }
         let varies = match code {
             Code::Input(column, _) => !column.is_uniform(),
-            Code::Light(_) | Code::Irradiance => true,
+            Code::Light | Code::Irradiance => true,
             _ => false,
         };
         let uniform = !varies && operands.iter().all(|operand| self.is_uniform(*operand));

@@ -322,14 +322,6 @@ impl Column {
     }
 }
 
-/// A number of a [`LightSample`](crate::shade::LightSample).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub(in crate::shade) enum LightPart {
-    Direction(u8),
-    Radiance(u8),
-    Visibility,
-}
-
 /// A noise of the library.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(in crate::shade) enum Noise {
@@ -422,8 +414,8 @@ library_functions! {
 pub(in crate::shade) enum Code {
     /// A component of an input.
     Input(Column, u8),
-    /// A number of the light with the index; the index has been checked.
-    Light(LightPart),
+    /// All of the light with the index, which has been checked: direction, radiance, visibility.
+    Light,
     /// Three floats.
     Irradiance,
     Float1(FloatUnary),

@@ -4,7 +4,7 @@
 //! interpreter's rows hold.
 
 use super::lower::Target;
-use super::run::Registers;
+use super::run::{LANES, Registers, View};
 use super::slice::Register;
 use crate::math::Vec3;
 use crate::shade::batch::OutputBatch;
@@ -21,21 +21,15 @@ pub(super) fn append(
     outputs: &mut OutputBatch,
 ) {
     let present = registers.bool(roots[0]);
-    let has = |row: usize| present.row(row) != 0;
     let float = |channel: usize| registers.float(roots[1 + channel]);
     let number = |column: &mut Vec<f32>, default: f32| {
-        let x = float(0);
-        column.extend((0..rows).map(|row| if has(row) { x.row(row) } else { default }));
+        fill(column, present, [float(0)], rows, |[x]| x, default);
     };
     let color = |column: &mut Vec<Vec3>, default: Vec3| {
-        let [x, y, z] = [float(0), float(1), float(2)];
-        column.extend(
-            (0..rows).map(|row| if has(row) { Vec3::new(x.row(row), y.row(row), z.row(row)) } else { default }),
-        );
+        fill(column, present, [float(0), float(1), float(2)], rows, Vec3::from_array, default);
     };
     let maybe_color = |column: &mut Vec<Option<Vec3>>| {
-        let [x, y, z] = [float(0), float(1), float(2)];
-        column.extend((0..rows).map(|row| has(row).then(|| Vec3::new(x.row(row), y.row(row), z.row(row)))));
+        fill(column, present, [float(0), float(1), float(2)], rows, |color| Some(Vec3::from_array(color)), None);
     };
     let output = match target {
         Target::Output(output) => *output,
@@ -62,15 +56,42 @@ pub(super) fn append(
         OutputSet::FEATURE => color(&mut outputs.feature, defaults::FEATURE),
         OutputSet::LINE_COLOR => maybe_color(&mut outputs.line_color),
         OutputSet::LINE_WIDTH => {
-            let x = float(0);
-            outputs.line_width.extend((0..rows).map(|row| has(row).then(|| x.row(row))));
+            fill(&mut outputs.line_width, present, [float(0)], rows, |[x]| Some(x), None);
         }
         OutputSet::PRIORITY => {
-            let x = registers.int(roots[1]);
             #[expect(clippy::cast_possible_truncation, reason = "hits where it does not fit have failed")]
-            outputs.priority.extend((0..rows).map(|row| has(row).then(|| x.row(row) as i32)));
+            fill(&mut outputs.priority, present, [registers.int(roots[1])], rows, |[x]| Some(x as i32), None);
         }
         OutputSet::COLOR => maybe_color(&mut outputs.color),
         _ => {}
+    }
+}
+
+/// Appends rows to a column, a block at a time.
+fn fill<T: Copy, S: Copy, const CHANNELS: usize>(
+    column: &mut Vec<T>,
+    present: View<'_, u32>,
+    channels: [View<'_, S>; CHANNELS],
+    rows: usize,
+    make: impl Fn([S; CHANNELS]) -> T,
+    absent: T,
+) {
+    let end = column.len() + rows;
+    match (present.uniform(), channels.map(|channel| channel.uniform())) {
+        (Some(0), _) => column.resize(end, absent),
+        (Some(_), values) if values.iter().all(Option::is_some) => {
+            column.resize(end, make(channels.map(|channel| channel.lanes(0)[0])));
+        }
+        _ => {
+            let mut left = rows;
+            for block in 0..rows.div_ceil(LANES) {
+                let (present, channels) = (present.lanes(block), channels.map(|channel| channel.lanes(block)));
+                let values: [T; LANES] = std::array::from_fn(|lane| {
+                    if present[lane] != 0 { make(channels.map(|channel| channel[lane])) } else { absent }
+                });
+                column.extend_from_slice(&values[..left.min(LANES)]);
+                left = left.saturating_sub(LANES);
+            }
+        }
     }
 }

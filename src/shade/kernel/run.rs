@@ -11,12 +11,12 @@ use smallvec::SmallVec;
 
 use super::ir::{
     BoolBinary, Code, Column, FloatBinaryLoop, FloatTernaryLoop, FloatUnaryLoop, IntBinaryLoop, IntCheckedLoop, Kind,
-    LibraryLoop, LightPart, MOST_ARGUMENTS, Noise,
+    LibraryLoop, MOST_ARGUMENTS, Noise,
 };
 use super::lower::TextureUse;
 use super::slice::{CarriedRegisters, LoopSteps, Register, Runnable, Step};
 use crate::math::{Vec2, Vec3, Vec4};
-use crate::shade::batch::HitBatch;
+use crate::shade::batch::{HitBatch, LightSample};
 use crate::shade::library::batch::noise as batch;
 use crate::shade::library::{hash, hit, math};
 use crate::shade::names::PathKind;
@@ -86,6 +86,18 @@ impl<'a, T: Copy> View<'a, T> {
     #[inline(always)]
     fn block(&self, index: usize) -> &'a [T; LANES] {
         &self.blocks[if self.uniform { 0 } else { index }].0
+    }
+
+    /// The rows of a block.
+    #[inline(always)]
+    pub fn lanes(&self, index: usize) -> &'a [T; LANES] {
+        self.block(index)
+    }
+
+    /// The one value of all rows, if it is uniform.
+    #[inline(always)]
+    pub fn uniform(&self) -> Option<T> {
+        self.uniform.then(|| self.blocks[0].0[0])
     }
 
     /// The value of a row.
@@ -441,7 +453,7 @@ impl Registers {
             }
             Code::Texture(texture) => self.texture(&chunk.textures[usize::from(texture)], operands, results, blocks),
             Code::Input(column, lane) => self.input(column, usize::from(lane), results[0], chunk),
-            Code::Light(part) => self.light(part, operands[0], results[0], chunk),
+            Code::Light => self.light(operands[0], results, chunk),
             Code::Irradiance => self.irradiance(results, chunk),
             Code::Native { function, .. } => {
                 self.native(&chunk.natives[usize::from(function)], operands, results, blocks, chunk);
@@ -637,38 +649,63 @@ impl Registers {
     }
 
     #[inline(always)]
-    fn light(&mut self, part: LightPart, index: Register, result: Register, chunk: &Chunk<'_>) {
+    fn light(&mut self, index: Register, results: &[Register], chunk: &Chunk<'_>) {
         let hits = chunk.hits;
         let count = hits.light_count;
-        let index = self.ints.view(index);
-        let mut out = self.floats.take(result);
-        let last = chunk.rows - 1;
-        for row in 0..chunk.blocks() * LANES {
-            // Hits whose index is out of range have failed; they may read anything.
-            let light = usize::try_from(index.row(row)).unwrap_or_default().min(count.saturating_sub(1));
-            let sample = hits.lights.get((chunk.first + row.min(last)) * count + light).copied().unwrap_or_default();
-            out[row / LANES].0[row % LANES] = match part {
-                LightPart::Direction(lane) => sample.direction[usize::from(lane)],
-                LightPart::Radiance(lane) => sample.radiance[usize::from(lane)],
-                LightPart::Visibility => sample.visibility,
-            };
+        let mut outs: [Vec<Block<f32>>; 7] = std::array::from_fn(|i| self.floats.take(results[i]));
+        let lights = hits.lights.get(chunk.first * count..(chunk.first + chunk.rows) * count).unwrap_or_default();
+        // Hits whose index is out of range have failed; they may read anything.
+        let in_range = |index: i64| usize::try_from(index).unwrap_or_default().min(count.saturating_sub(1));
+        let index_of = self.ints.view(index);
+        if !lights.is_empty() {
+            for block in 0..chunk.blocks() {
+                let index = index_of.block(block);
+                let samples: [&LightSample; LANES] = std::array::from_fn(|lane| {
+                    &lights[(block * LANES + lane).min(chunk.rows - 1) * count + in_range(index[lane])]
+                });
+                outs[0][block].0 = samples.map(|sample| sample.direction.x);
+                outs[1][block].0 = samples.map(|sample| sample.direction.y);
+                outs[2][block].0 = samples.map(|sample| sample.direction.z);
+                outs[3][block].0 = samples.map(|sample| sample.radiance.x);
+                outs[4][block].0 = samples.map(|sample| sample.radiance.y);
+                outs[5][block].0 = samples.map(|sample| sample.radiance.z);
+                outs[6][block].0 = samples.map(|sample| sample.visibility);
+            }
         }
-        self.floats.put(result, out);
+        for (register, out) in results.iter().zip(outs) {
+            self.floats.put(*register, out);
+        }
     }
 
+    /// As [`hit::irradiance`], for a block of hits at a time.
     #[inline(always)]
     fn irradiance(&mut self, results: &[Register], chunk: &Chunk<'_>) {
         let hits = chunk.hits;
         let count = hits.light_count;
-        let mut outs = [0, 1, 2].map(|i| self.floats.take(results[i]));
-        let last = chunk.rows - 1;
-        for row in 0..chunk.blocks() * LANES {
-            let hit = chunk.first + row.min(last);
-            let lights = hits.lights.get(hit * count..(hit + 1) * count).unwrap_or_default();
-            let normal = hits.normal.get(hit).copied().unwrap_or_default();
-            let sum = hit::irradiance(normal, lights);
-            for (out, x) in outs.iter_mut().zip(sum.to_array()) {
-                out[row / LANES].0[row % LANES] = x;
+        let mut outs: [Vec<Block<f32>>; 3] = std::array::from_fn(|i| self.floats.take(results[i]));
+        let rows = chunk.first..chunk.first + chunk.rows;
+        let lights = hits.lights.get(rows.start * count..rows.end * count).unwrap_or_default();
+        let normals = hits.normal.get(rows).unwrap_or_default();
+        for block in 0..chunk.blocks() {
+            let row = |lane: usize| (block * LANES + lane).min(chunk.rows - 1);
+            let mut sums = [[0.0; LANES]; 3];
+            if !normals.is_empty() && !lights.is_empty() {
+                let normals: [Vec3; LANES] = std::array::from_fn(|lane| normals[row(lane)]);
+                for light in 0..count {
+                    let samples: [&LightSample; LANES] = std::array::from_fn(|lane| &lights[row(lane) * count + light]);
+                    let facing: [f32; LANES] =
+                        std::array::from_fn(|lane| hit::facing(normals[lane], samples[lane].direction));
+                    let shares: [f32; LANES] = samples.map(|sample| sample.visibility);
+                    for (channel, sums) in sums.iter_mut().enumerate() {
+                        let radiance: [f32; LANES] = samples.map(|sample| sample.radiance[channel]);
+                        for lane in 0..LANES {
+                            sums[lane] += radiance[lane] * shares[lane] * facing[lane];
+                        }
+                    }
+                }
+            }
+            for (out, sums) in outs.iter_mut().zip(sums) {
+                out[block].0 = sums;
             }
         }
         for (register, out) in results.iter().zip(outs) {

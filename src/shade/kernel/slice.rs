@@ -208,12 +208,9 @@ fn short_cost(item: &Item) -> Option<u32> {
         ) => 1,
         Code::Float1(_) => 30,
         Code::Noise(Noise::Fbm(octaves)) => 60 * u32::from(octaves),
-        Code::Noise(_)
-        | Code::Library(_)
-        | Code::Texture(_)
-        | Code::Native { .. }
-        | Code::Light(_)
-        | Code::Irradiance => 60,
+        Code::Noise(_) | Code::Library(_) | Code::Texture(_) | Code::Native { .. } | Code::Light | Code::Irradiance => {
+            60
+        }
         Code::HashFloats(_) | Code::HashInt(_) => 15,
         _ => 1,
     })
@@ -259,13 +256,7 @@ fn number(kind: Kind) -> usize {
 
 impl<'a> Allocation<'a> {
     fn new(types: &'a [ValueType]) -> Self {
-        Self {
-            types,
-            last_use: vec![0; types.len()],
-            pools: Default::default(),
-            registers: HashMap::new(),
-            place: 0,
-        }
+        Self { types, last_use: vec![0; types.len()], pools: Default::default(), registers: HashMap::new(), place: 0 }
     }
 
     fn find_last_uses(&mut self, block: &Block, roots: &[Operand]) {
@@ -530,7 +521,7 @@ fn add_inputs(steps: &[Step], inputs: &mut InputSet) {
 /// The input that an instruction reads.
 fn input(code: Code) -> InputSet {
     match code {
-        Code::Light(_) => InputSet::LIGHT,
+        Code::Light => InputSet::LIGHT,
         Code::Irradiance => InputSet::IRRADIANCE,
         Code::Input(column, _) => match column {
             Column::Position => InputSet::POSITION,

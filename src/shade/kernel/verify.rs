@@ -89,7 +89,7 @@ fn check(instruction: &Instruction, types: &[ValueType]) -> Result<(), String> {
     use Kind::{Bool, Float, Int};
     let wanted: &[Kind] = match instruction.code {
         Code::Input(..) | Code::Irradiance => &[],
-        Code::Light(_) | Code::IntSign | Code::FloatFromInt | Code::HashInt(_) => &[Int],
+        Code::Light | Code::IntSign | Code::FloatFromInt | Code::HashInt(_) => &[Int],
         Code::Float1(_) | Code::IsNan => &[Float],
         Code::Float2(_) | Code::CompareFloats(_) => &[Float, Float],
         Code::Texture(_) => &[Float, Float, Float][..instruction.operands.len().clamp(2, 3)],

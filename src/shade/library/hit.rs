@@ -110,7 +110,13 @@ impl Hit {
 pub(in crate::shade) fn irradiance(normal: Vec3, lights: &[LightSample]) -> Vec3 {
     lights
         .iter()
-        .fold(Vec3::ZERO, |sum, light| sum + light.radiance * light.visibility * max(0.0, dot(normal, light.direction)))
+        .fold(Vec3::ZERO, |sum, light| sum + light.radiance * light.visibility * facing(normal, light.direction))
+}
+
+/// How much a surface faces a light: `max(0, dot(normal, direction))`.
+#[inline(always)]
+pub(in crate::shade) fn facing(normal: Vec3, direction: Vec3) -> f32 {
+    max(0.0, dot(normal, direction))
 }
 
 /// A hit was asked for what its batch does not hold: the analysis missed that the script reads it.

@@ -7,7 +7,7 @@ use rhai::Position;
 
 use super::super::ir::{
     Code, Column, Comparison, FloatBinary, FloatTernary, FloatUnary, IntBinary, IntChecked, Kind, LibraryFunction,
-    LightPart, Noise, Operand,
+    Noise, Operand,
 };
 use super::meaning::{Channels, Meaning};
 use super::{Flow, Lowerer};
@@ -208,14 +208,12 @@ impl Lowerer<'_> {
     }
 
     pub(super) fn light_part(&mut self, index: Operand, name: &str, position: Position) -> Flow<Meaning> {
-        let three = |lowerer: &mut Self, part: fn(u8) -> LightPart| {
-            let channels = (0..3).map(|lane| lowerer.builder.emit(Code::Light(part(lane)), &[index]));
-            Meaning::Vector(channels.collect())
-        };
+        let all = self.many(Code::Light, &[index], 7);
+        let Meaning::Vector(all) = all else { return self.give_up(position, "a light") };
         match name {
-            "direction" => Ok(three(self, LightPart::Direction)),
-            "radiance" => Ok(three(self, LightPart::Radiance)),
-            "visibility" => Ok(Meaning::Float(self.builder.emit(Code::Light(LightPart::Visibility), &[index]))),
+            "direction" => Ok(Meaning::vector(&all[..3])),
+            "radiance" => Ok(Meaning::vector(&all[3..6])),
+            "visibility" => Ok(Meaning::Float(all[6])),
             _ => self.give_up(position, &format!("`{name}` of a light")),
         }
     }
