@@ -9,6 +9,7 @@
 #[cfg(test)]
 mod check;
 pub mod noise;
+pub mod transcendental;
 
 /// Lanes of a block.
 pub const LANES: usize = 16;
