@@ -10,6 +10,7 @@ pub mod framing;
 pub mod gltf;
 pub mod ids;
 pub mod light;
+mod lookup;
 pub mod material;
 pub mod mesh;
 pub mod settings;

@@ -24,7 +24,7 @@ pub const MAX_PIXELS: u64 = 1 << 27;
 const MAX_FLOAT: f32 = 1e30;
 
 /// Linear values of the 256 sRGB-encoded ones.
-static LINEAR_FROM_SRGB8: LazyLock<[f32; 256]> =
+pub(super) static LINEAR_FROM_SRGB8: LazyLock<[f32; 256]> =
     LazyLock::new(|| std::array::from_fn(|i| linear_from_srgb(i as f32 / 255.0)));
 
 /// What happens outside 0 … 1.
@@ -139,9 +139,10 @@ impl Texture {
             TextureFilter::Linear => {
                 let (x0, x1, fx) = neighbors(u, image.width, self.wrap[0]);
                 let (y0, y1, fy) = neighbors(v, image.height, self.wrap[1]);
-                let top = between(image.pixel(x0, y0), image.pixel(x1, y0), fx);
-                let bottom = between(image.pixel(x0, y1), image.pixel(x1, y1), fx);
-                between(top, bottom, fy)
+                let (a, b) = (image.pixel(x0, y0).to_array(), image.pixel(x1, y0).to_array());
+                let (c, d) = (image.pixel(x0, y1).to_array(), image.pixel(x1, y1).to_array());
+                let channel = |i: usize| between(between(a[i], b[i], fx), between(c[i], d[i], fx), fy);
+                Vec4::from_array(std::array::from_fn(channel))
             }
         }
     }
@@ -178,7 +179,8 @@ fn bounds<T: Copy>(
 }
 
 /// A texture coordinate brought into 0 … 1 (both included).
-fn fold(t: f32, wrap: Wrap) -> f32 {
+#[inline(always)]
+pub(super) fn fold(t: f32, wrap: Wrap) -> f32 {
     if !t.is_finite() {
         return 0.0;
     }
@@ -208,8 +210,12 @@ fn neighbors(t: f32, size: u32, wrap: Wrap) -> (u32, u32, f32) {
 }
 
 /// Between two values, and never beyond either whatever the rounding.
-fn between(a: Vec4, b: Vec4, t: f32) -> Vec4 {
-    (a + (b - a) * t).clamp(a.min(b), a.max(b))
+#[inline(always)]
+pub(super) fn between(a: f32, b: f32, t: f32) -> f32 {
+    let (low, high) = if a < b { (a, b) } else { (b, a) };
+    let value = a + (b - a) * t;
+    let value = if value > low { value } else { low };
+    if value < high { value } else { high }
 }
 
 /// Decodes a PNG, JPEG, Radiance HDR or OpenEXR image; the content tells which, not the name.

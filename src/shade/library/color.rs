@@ -25,7 +25,8 @@ pub(super) const FUNCTIONS: &[Function] = &[
 
 /// For `n` = 5, 3 and 1 (red, green, blue), with `k = mod(n + hue * 6, 6)`:
 /// `value - value * saturation * max(0, min(min(k, 4 - k), 1))`.
-fn rgb_from_hsv(hue: f32, saturation: f32, value: f32) -> Vec3 {
+#[inline(always)]
+pub(super) fn rgb_from_hsv(hue: f32, saturation: f32, value: f32) -> Vec3 {
     let channel = |n: f32| {
         let k = floored_mod(n + hue * 6.0, 6.0);
         value - value * saturation * max(0.0, min(min(k, 4.0 - k), 1.0))
@@ -34,7 +35,8 @@ fn rgb_from_hsv(hue: f32, saturation: f32, value: f32) -> Vec3 {
 }
 
 /// Hue in turns (0 for grays), saturation (0 for black), value.
-fn hsv_from_rgb(color: Vec3) -> Vec3 {
+#[inline(always)]
+pub(super) fn hsv_from_rgb(color: Vec3) -> Vec3 {
     let [r, g, b] = color.to_array();
     let value = max(max(r, g), b);
     let chroma = value - min(min(r, g), b);

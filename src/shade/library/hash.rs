@@ -12,6 +12,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
 ];
 
 /// An integer hash with good avalanche: C. Wellons' `lowbias32`.
+#[inline(always)]
 fn scramble(mut x: u32) -> u32 {
     x ^= x >> 16;
     x = x.wrapping_mul(0x7feb_352d);
@@ -20,20 +21,32 @@ fn scramble(mut x: u32) -> u32 {
     x ^ (x >> 16)
 }
 
+/// The hash so far with another word.
+#[inline(always)]
+pub(super) fn join(hash: u32, word: u32) -> u32 {
+    scramble(hash ^ word).wrapping_add(0x9e37_79b9)
+}
+
+/// The bits of a float, −0 counting as 0, and every NaN (whose bits differ between CPUs) as the same.
+#[inline(always)]
+pub(super) fn word(x: f32) -> u32 {
+    if x.is_nan() { f32::NAN.to_bits() } else { (x + 0.0).to_bits() }
+}
+
 /// From a seed, for each word in order, `h = scramble(h ^ word) + 0x9e3779b9`. The words of an int are its low and high
 /// 32 bits; of floats, the bits of each component, −0 counting as 0. So 1 and 1.0 differ.
-fn digest(seed: u32, value: Operand) -> u32 {
-    let join = |h: u32, word: u32| scramble(h ^ word).wrapping_add(0x9e37_79b9);
+pub(super) fn digest(seed: u32, value: Operand) -> u32 {
     match value {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the halves are taken as bits")]
         Operand::Int(x) => join(join(seed, x as u32), (x >> 32) as u32),
-        _ => (0..value.width()).fold(seed, |h, lane| join(h, (value.lane(lane) + 0.0).to_bits())),
+        _ => (0..value.width()).fold(seed, |h, lane| join(h, word(value.lane(lane)))),
     }
 }
 
 /// The upper 24 bits as a fraction, each value exact.
 #[expect(clippy::cast_precision_loss, reason = "24 bits fit a float")]
-fn unit(h: u32) -> f32 {
+#[inline(always)]
+pub(super) fn unit(h: u32) -> f32 {
     (scramble(h) >> 8) as f32 / 16_777_216.0
 }
 

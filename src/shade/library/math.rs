@@ -66,36 +66,43 @@ pub(super) const FUNCTIONS: &[Function] = &[
 pub(in crate::shade) const CONSTANTS: [(&str, f32); 2] = [("PI", PI), ("TAU", TAU)];
 
 /// `b` where `b < a`, else `a`: a NaN in `a` stays.
+#[inline(always)]
 pub(super) fn min(a: f32, b: f32) -> f32 {
     if b < a { b } else { a }
 }
 
 /// `b` where `a < b`, else `a`: a NaN in `a` stays.
+#[inline(always)]
 pub(super) fn max(a: f32, b: f32) -> f32 {
     if a < b { b } else { a }
 }
 
 /// `min(max(x, low), high)`.
+#[inline(always)]
 pub(super) fn clamp(x: f32, low: f32, high: f32) -> f32 {
     min(max(x, low), high)
 }
 
 /// `clamp(x, 0, 1)`.
+#[inline(always)]
 pub(super) fn saturate(x: f32) -> f32 {
     clamp(x, 0.0, 1.0)
 }
 
 /// `a * (1 - t) + b * t`: exactly `a` at 0 and `b` at 1.
+#[inline(always)]
 pub(super) fn mix(a: f32, b: f32, t: f32) -> f32 {
     a * (1.0 - t) + b * t
 }
 
 /// 0 where `x < edge`, else 1.
+#[inline(always)]
 pub(super) fn step(edge: f32, x: f32) -> f32 {
     if x < edge { 0.0 } else { 1.0 }
 }
 
 /// With `t = saturate((x - low) / (high - low))`: `t * t * (3 - 2 * t)`. With `low = high` it is `step(low, x)`.
+#[inline(always)]
 pub(super) fn smoothstep(low: f32, high: f32, x: f32) -> f32 {
     if low == high {
         return step(low, x);
@@ -105,11 +112,13 @@ pub(super) fn smoothstep(low: f32, high: f32, x: f32) -> f32 {
 }
 
 /// `to_low + (x - from_low) / (from_high - from_low) * (to_high - to_low)`.
+#[inline(always)]
 pub(super) fn remap(x: f32, from_low: f32, from_high: f32, to_low: f32, to_high: f32) -> f32 {
     to_low + (x - from_low) / (from_high - from_low) * (to_high - to_low)
 }
 
 /// -1, 0 or 1; a NaN stays.
+#[inline(always)]
 pub(super) fn sign(x: f32) -> f32 {
     if x > 0.0 {
         1.0
@@ -121,11 +130,13 @@ pub(super) fn sign(x: f32) -> f32 {
 }
 
 /// `x - floor(x)`.
+#[inline(always)]
 pub(super) fn fract(x: f32) -> f32 {
     x - x.floor()
 }
 
 /// `x - y * floor(x / y)`.
+#[inline(always)]
 pub(super) fn floored_mod(x: f32, y: f32) -> f32 {
     x - y * (x / y).floor()
 }
