@@ -4,6 +4,7 @@
 //! code compiled for wide vectors; only the pixels are fetched one by one.
 
 use super::texture::{Image, LINEAR_FROM_SRGB8, Pixels, Texture, TextureFilter, Wrap, between, fold};
+use crate::math::Vec2;
 
 /// Places looked up at once.
 const LANES: usize = 16;
@@ -40,7 +41,7 @@ impl Texture {
                     }
                 }
             }
-            TextureFilter::Linear => {
+            TextureFilter::Linear | TextureFilter::Mipmap => {
                 let around = around(image, &u, &v, self.wrap);
                 match &image.pixels {
                     Pixels::Rgba8 { data, srgb } => interpolate_rgba8(data, *srgb, &around, out),
@@ -49,8 +50,23 @@ impl Texture {
             }
         }
     }
+
+    /// [`sample_wide`](Self::sample_wide) of each lane: `out` gets red, green, blue and alpha.
+    #[inline(always)]
+    pub fn sample_wide_lanes(&self, u: &Lanes, v: &Lanes, width: &Lanes, out: &mut [Lanes; 4]) {
+        if self.filter != TextureFilter::Mipmap {
+            return self.sample_lanes(u, v, out);
+        }
+        for i in 0..LANES {
+            let pixel = self.sample_wide(Vec2::new(u[i], v[i]), width[i]).to_array();
+            for (channel, out) in out.iter_mut().enumerate() {
+                out[i] = pixel[channel];
+            }
+        }
+    }
 }
 
+/// The coordinates brought into 0 … 1.
 #[inline(always)]
 fn folded(t: &Lanes, wrap: Wrap) -> Lanes {
     let mut out = [0.0; LANES];
@@ -191,10 +207,9 @@ fn interpolate_floats(data: &[[f32; 4]], around: &Around, out: &mut [Lanes; 4]) 
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Arc;
+    use std::sync::{Arc, OnceLock};
 
     use super::*;
-    use crate::math::Vec2;
 
     struct Look<'a>(&'a Texture, &'a Lanes, &'a Lanes, &'a mut [Lanes; 4]);
 
@@ -265,6 +280,7 @@ mod tests {
                                 image: Arc::clone(&image),
                                 wrap: [across, down],
                                 filter,
+                                levels: OnceLock::new(),
                             };
                             for _ in 0..60 {
                                 let u = std::array::from_fn(|_| coordinate(next(), width));

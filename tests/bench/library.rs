@@ -4,7 +4,7 @@
 //! AVX2, and what every x86-64 has (SSE2).
 
 use std::hint::black_box;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 
 use fastnoise_lite::{CellularDistanceFunction, CellularReturnType, FastNoiseLite, FractalType, NoiseType};
@@ -267,7 +267,13 @@ fn measure_textures() {
     for (name, pixels) in images {
         let image = Arc::new(Image { width: SIDE, height: SIDE, pixels });
         for filter in [TextureFilter::Nearest, TextureFilter::Linear] {
-            let texture = Texture { name: String::new(), image: Arc::clone(&image), wrap: [Wrap::Repeat; 2], filter };
+            let texture = Texture {
+                name: String::new(),
+                image: Arc::clone(&image),
+                wrap: [Wrap::Repeat; 2],
+                filter,
+                levels: OnceLock::new(),
+            };
             let name =
                 format!("texture, {name}, {}", if filter == TextureFilter::Linear { "bilinear" } else { "nearest" });
             let scalar = |[u, v]: [f32; 2]| texture.sample(Vec2::new(u, v)).x;

@@ -63,8 +63,7 @@ pub fn hsv_from_rgb(red: &Lanes, green: &Lanes, blue: &Lanes, out: &mut [Lanes; 
 #[inline(always)]
 fn seeded_hash<const N: usize>(components: [&Lanes; N], seed: u32, out: &mut Lanes) {
     for i in 0..LANES {
-        let words = components.map(|component| hashes::word(component[i]));
-        out[i] = hashes::unit(words.into_iter().fold(seed, hashes::join));
+        out[i] = hashes::of_floats(seed, &components.map(|component| component[i]));
     }
 }
 
@@ -86,8 +85,7 @@ pub fn hash_color<const N: usize>(components: [&Lanes; N], out: &mut [Lanes; 3])
 #[inline(always)]
 fn seeded_hash_int(x: &[i64; LANES], seed: u32, out: &mut Lanes) {
     for i in 0..LANES {
-        let low = hashes::join(seed, x[i] as u32);
-        out[i] = hashes::unit(hashes::join(low, (x[i] >> 32) as u32));
+        out[i] = hashes::of_int(seed, x[i]);
     }
 }
 
@@ -111,9 +109,7 @@ mod tests {
     use super::super::check::{Numbers, same_bits};
     use super::*;
     use crate::math;
-    use crate::math::{Vec2, Vec4};
     use crate::shade::library::math as scalar;
-    use crate::shade::library::operand::Operand;
 
     const COUNT: usize = 500_000;
 
@@ -200,13 +196,12 @@ mod tests {
     fn hashes_are_the_same_in_batches() {
         let mut numbers = Numbers::new(8);
         let mut next = || std::array::from_fn(|_| numbers.any());
-        let of = |operand, seed| hashes::unit(hashes::digest(seed, operand));
-        let both = |operand| [of(operand, 0), of(operand, 1), of(operand, 2), of(operand, 3)];
+        let both = |components: &[f32]| [0, 1, 2, 3].map(|seed| hashes::of_floats(seed, components));
         same_bits(
             "hash",
             COUNT,
             || next().map(|x: f32| x),
-            |[x, _]| both(Operand::Float(x)),
+            |[x, _]| both(&[x]),
             |[x, _], [h, color @ ..]| {
                 hash([x], h);
                 hash_color([x], color);
@@ -217,7 +212,7 @@ mod tests {
             "hash",
             COUNT,
             &mut next,
-            |v| both(Operand::Vec2(Vec2::from(v))),
+            |v: [f32; 2]| both(&v),
             |[x, y], [h, color @ ..]| {
                 hash([x, y], h);
                 hash_color([x, y], color);
@@ -228,7 +223,7 @@ mod tests {
             "hash",
             COUNT,
             &mut next,
-            |v| both(Operand::Vec3(Vec3::from(v))),
+            |v: [f32; 3]| both(&v),
             |[x, y, z], [h, color @ ..]| {
                 hash([x, y, z], h);
                 hash_color([x, y, z], color);
@@ -239,7 +234,7 @@ mod tests {
             "hash",
             COUNT,
             &mut next,
-            |v| both(Operand::Vec4(Vec4::from(v))),
+            |v: [f32; 4]| both(&v),
             |[x, y, z, w], [h, color @ ..]| {
                 hash([x, y, z, w], h);
                 hash_color([x, y, z, w], color);
@@ -251,7 +246,8 @@ mod tests {
             hash_int(&x, &mut h);
             hash_color_int(&x, &mut color);
             for lane in 0..LANES {
-                assert_eq!(both(Operand::Int(x[lane])), [h[lane], color[0][lane], color[1][lane], color[2][lane]]);
+                let wanted = [0, 1, 2, 3].map(|seed| hashes::of_int(seed, x[lane]));
+                assert_eq!(wanted, [h[lane], color[0][lane], color[1][lane], color[2][lane]]);
             }
         }
     }
