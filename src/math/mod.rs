@@ -18,6 +18,7 @@ pub fn luminance(color: Vec3) -> f32 {
 }
 
 /// One linear component as an sRGB-encoded value; both 0 … 1, input clamped.
+#[inline(always)]
 #[must_use]
 pub fn srgb_from_linear(linear: f32) -> f32 {
     let x = linear.clamp(0.0, 1.0);
@@ -25,6 +26,7 @@ pub fn srgb_from_linear(linear: f32) -> f32 {
 }
 
 /// One sRGB-encoded component (0 … 1) as a linear value.
+#[inline(always)]
 #[must_use]
 pub fn linear_from_srgb(encoded: f32) -> f32 {
     if encoded <= 0.040_45 { encoded / 12.92 } else { portable::pow((encoded + 0.055) / 1.055, 2.4) }

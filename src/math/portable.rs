@@ -2,15 +2,16 @@
 //!
 //! Each is computed in double precision from nothing but additions, multiplications, divisions, square roots and bit
 //! operations, which IEEE 754 defines to the last bit, in a fixed order, never fused; then rounded once. The polynomials
-//! are good for 1e-11, so a result is the float nearest to the true value but for rare cases where it is the one beside
-//! (at most 0.51 units in the last place; the tests measure it). Special cases are those of C99 (annex F).
+//! are good for 1e-10, so a result is the float nearest to the true value, or in rare cases the one beside it (an error of
+//! at most 0.501 units in the last place; a test measures it). Special cases are those of C99 (annex F).
 //!
-//! The functions of [`lane`] have neither branches nor calls, so that a loop over them becomes vector instructions; the
-//! plain ones are the same code.
+//! All but [`sin`], [`cos`] and [`tan`], and all of [`lane`], have neither branches nor calls and are always inlined: a loop
+//! over them becomes vector instructions.
 
 macro_rules! plain {
     ($($(#[$doc:meta])* $name:ident($($x:ident),*)),* $(,)?) => { $(
         $(#[$doc])*
+        #[inline(always)]
         #[must_use]
         pub fn $name($($x: f32),*) -> f32 {
             lane::$name($($x),*)

@@ -14,6 +14,19 @@ type Lanes = [f32; LANES];
 /// For each lane an index into an image.
 type Places = [u32; LANES];
 
+/// Values of the 256 codes as they are.
+static PLAIN8: [f32; 256] = plain8();
+
+const fn plain8() -> [f32; 256] {
+    let mut table = [0.0; 256];
+    let mut code = 0;
+    while code < 256 {
+        table[code] = code as f32 / 255.0;
+        code += 1;
+    }
+    table
+}
+
 /// The four pixels around each lane's place, and how far it is from the first to the second, along x and along y.
 struct Around {
     corners: [Places; 4],
@@ -159,17 +172,11 @@ fn fetched(data: &[[u8; 4]], places: &Places) -> [u32; LANES] {
 /// The linear channels of pixels.
 #[inline(always)]
 fn decode(pixels: &[u32; LANES], srgb: bool, out: &mut [Lanes; 4]) {
-    if srgb {
-        let table: &[f32; 256] = &LINEAR_FROM_SRGB8;
-        for (channel, out) in out.iter_mut().take(3).enumerate() {
-            for i in 0..LANES {
-                out[i] = table[(pixels[i] >> (channel * 8) & 255) as usize];
-            }
-        }
-    }
-    for (channel, out) in out.iter_mut().enumerate().skip(if srgb { 3 } else { 0 }) {
+    let color: &[f32; 256] = if srgb { &LINEAR_FROM_SRGB8 } else { &PLAIN8 };
+    for (channel, out) in out.iter_mut().enumerate() {
+        let table = if channel < 3 { color } else { &PLAIN8 };
         for i in 0..LANES {
-            out[i] = (pixels[i] >> (channel * 8) & 255) as i32 as f32 / 255.0;
+            out[i] = table[(pixels[i] >> (channel * 8) & 255) as usize];
         }
     }
 }

@@ -15,15 +15,22 @@ use tusche::shade::library::batch::{LANES, Lanes, noise, numeric, transcendental
 const BLOCKS: usize = 64;
 const RUNS: usize = 60;
 
-struct Blocks<'a, F, const N: usize, const M: usize>(F, &'a [[Lanes; N]], &'a mut [[Lanes; M]]);
+/// Aligned as the blocks of kernels are, for the widest loads.
+#[derive(Clone)]
+#[repr(align(64))]
+struct Aligned<T>(T);
+
+struct Blocks<'a, F, const N: usize, const M: usize>(F, &'a [Aligned<[Lanes; N]>], &'a mut [Aligned<[Lanes; M]>]);
 
 impl<F: Fn(&[Lanes; N], &mut [Lanes; M]), const N: usize, const M: usize> pulp::WithSimd for Blocks<'_, F, N, M> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
-        for (given, out) in self.1.iter().zip(self.2) {
-            (self.0)(given, out);
+        for (index, out) in self.2.iter_mut().enumerate() {
+            // Else the compiler may turn the loop over blocks into vectors instead of that over lanes.
+            let index = black_box(index);
+            (self.0)(&self.1[index].0, &mut out.0);
         }
     }
 }
@@ -53,13 +60,13 @@ fn measure<const N: usize, const M: usize>(
         state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (state >> 40) as f32 / (1 << 24) as f32 * size
     };
-    let given: Vec<[Lanes; N]> = (0..BLOCKS).map(|_| [(); N].map(|()| [(); LANES].map(|()| next()))).collect();
-    let mut out = vec![[[0.0; LANES]; M]; BLOCKS];
+    let given: Vec<_> = (0..BLOCKS).map(|_| Aligned([(); N].map(|()| [(); LANES].map(|()| next())))).collect();
+    let mut out = vec![Aligned([[0.0; LANES]; M]); BLOCKS];
     let one = scalar.map(|scalar| {
         nanoseconds(|| {
             for block in black_box(&given) {
                 (0..LANES).for_each(|lane| {
-                    black_box(scalar(std::array::from_fn(|component| block[component][lane])));
+                    black_box(scalar(std::array::from_fn(|component| block.0[component][lane])));
                 });
             }
         })

@@ -1,10 +1,13 @@
 //! Batch forms of functions of numbers, colours and hashes, where a loop over the scalar form is not vector code already.
 //!
+//! All work on copies of their blocks: only what cannot overlap is sure to become vector instructions (a sum of two blocks
+//! in place takes six times as long).
+//!
 //! `floor`, `ceil` and `round` are instructions wherever vectors are wide (AVX, NEON); on a CPU with SSE2 alone they are
 //! calls, with the same results.
 
 use super::{LANES, Lanes};
-use crate::math::{Vec3, portable::lane};
+use crate::math::Vec3;
 use crate::shade::library::{color, hash as hashes, math};
 
 macro_rules! lanewise {
@@ -12,9 +15,12 @@ macro_rules! lanewise {
         $(#[$doc])*
         #[inline(always)]
         pub fn $name($($x: &Lanes,)* out: &mut Lanes) {
+            $(let $x = *$x;)*
+            let mut results = [0.0; LANES];
             for i in 0..LANES {
-                out[i] = $f($($x[i]),*);
+                results[i] = $f($($x[i]),*);
             }
+            *out = results;
         }
     )* };
 }
@@ -36,35 +42,40 @@ lanewise! {
     /// `remap` of each lane.
     remap(x, from_low, from_high, to_low, to_high) = math::remap;
     /// One channel of `srgb` of each lane.
-    linear_from_srgb(encoded) = |encoded: f32| {
-        let power = lane::pow((encoded + 0.055) / 1.055, 2.4);
-        if encoded <= 0.040_45 { encoded / 12.92 } else { power }
-    };
+    linear_from_srgb(encoded) = crate::math::linear_from_srgb;
 }
 
 /// `hsv` of each lane: red, green and blue.
 #[inline(always)]
 pub fn rgb_from_hsv(hue: &Lanes, saturation: &Lanes, value: &Lanes, out: &mut [Lanes; 3]) {
+    let (hue, saturation, value) = (*hue, *saturation, *value);
+    let mut channels = [[0.0; LANES]; 3];
     for i in 0..LANES {
         let color = color::rgb_from_hsv(hue[i], saturation[i], value[i]);
-        [out[0][i], out[1][i], out[2][i]] = color.to_array();
+        [channels[0][i], channels[1][i], channels[2][i]] = color.to_array();
     }
+    *out = channels;
 }
 
 /// `hsv_from_rgb` of each lane: hue, saturation and value.
 #[inline(always)]
 pub fn hsv_from_rgb(red: &Lanes, green: &Lanes, blue: &Lanes, out: &mut [Lanes; 3]) {
+    let (red, green, blue) = (*red, *green, *blue);
+    let mut channels = [[0.0; LANES]; 3];
     for i in 0..LANES {
         let hsv = color::hsv_from_rgb(Vec3::new(red[i], green[i], blue[i]));
-        [out[0][i], out[1][i], out[2][i]] = hsv.to_array();
+        [channels[0][i], channels[1][i], channels[2][i]] = hsv.to_array();
     }
+    *out = channels;
 }
 
 #[inline(always)]
 fn seeded_hash<const N: usize>(components: [&Lanes; N], seed: u32, out: &mut Lanes) {
+    let mut results = [0.0; LANES];
     for i in 0..LANES {
-        out[i] = hashes::of_floats(seed, &components.map(|component| component[i]));
+        results[i] = hashes::of_floats(seed, &components.map(|component| component[i]));
     }
+    *out = results;
 }
 
 /// `hash` of each lane: of a float or a vector.
@@ -84,9 +95,12 @@ pub fn hash_color<const N: usize>(components: [&Lanes; N], out: &mut [Lanes; 3])
 
 #[inline(always)]
 fn seeded_hash_int(x: &[i64; LANES], seed: u32, out: &mut Lanes) {
+    let x = *x;
+    let mut results = [0.0; LANES];
     for i in 0..LANES {
-        out[i] = hashes::of_int(seed, x[i]);
+        results[i] = hashes::of_int(seed, x[i]);
     }
+    *out = results;
 }
 
 /// `hash` of each lane: of an int.
