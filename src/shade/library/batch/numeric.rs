@@ -69,8 +69,9 @@ pub fn hsv_from_rgb(red: &Lanes, green: &Lanes, blue: &Lanes, out: &mut [Lanes; 
     *out = channels;
 }
 
+/// The hash of each lane, of a float or a vector: with seed 0 `hash`, with 1 to 3 a channel of `hash_color`.
 #[inline(always)]
-fn seeded_hash<const N: usize>(components: [&Lanes; N], seed: u32, out: &mut Lanes) {
+pub fn seeded_hash<const N: usize>(components: [&Lanes; N], seed: u32, out: &mut Lanes) {
     let mut results = [0.0; LANES];
     for i in 0..LANES {
         results[i] = hashes::of_floats(seed, &components.map(|component| component[i]));
@@ -93,8 +94,9 @@ pub fn hash_color<const N: usize>(components: [&Lanes; N], out: &mut [Lanes; 3])
     seeded_hash(components, 3, blue);
 }
 
+/// The hash of each lane, of an int: with seed 0 `hash`, with 1 to 3 a channel of `hash_color`.
 #[inline(always)]
-fn seeded_hash_int(x: &[i64; LANES], seed: u32, out: &mut Lanes) {
+pub fn seeded_hash_int(x: &[i64; LANES], seed: u32, out: &mut Lanes) {
     let x = *x;
     let mut results = [0.0; LANES];
     for i in 0..LANES {
