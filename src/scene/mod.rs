@@ -11,6 +11,7 @@ pub mod framing;
 pub mod gltf;
 pub mod ids;
 pub mod light;
+mod lookup;
 pub mod material;
 pub mod mesh;
 pub mod script_files;

@@ -24,7 +24,7 @@ pub const MAX_PIXELS: u64 = 1 << 27;
 const MAX_FLOAT: f32 = 1e30;
 
 /// Linear values of the 256 sRGB-encoded ones.
-static LINEAR_FROM_SRGB8: LazyLock<[f32; 256]> =
+pub(super) static LINEAR_FROM_SRGB8: LazyLock<[f32; 256]> =
     LazyLock::new(|| std::array::from_fn(|i| linear_from_srgb(i as f32 / 255.0)));
 
 /// What happens outside 0 … 1.
@@ -163,15 +163,15 @@ impl Texture {
         let of = |level: usize| level.checked_sub(1).map_or(image, |index| &levels[index]);
         let low = self.bilinear(of(below as usize), u, v);
         let high = self.bilinear(of((below as usize + 1).min(levels.len())), u, v);
-        between(low, high, level - below)
+        between_pixels(low, high, level - below)
     }
 
     fn bilinear(&self, image: &Image, u: f32, v: f32) -> Vec4 {
         let (x0, x1, fx) = neighbors(u, image.width, self.wrap[0]);
         let (y0, y1, fy) = neighbors(v, image.height, self.wrap[1]);
-        let top = between(image.pixel(x0, y0), image.pixel(x1, y0), fx);
-        let bottom = between(image.pixel(x0, y1), image.pixel(x1, y1), fx);
-        between(top, bottom, fy)
+        let top = between_pixels(image.pixel(x0, y0), image.pixel(x1, y0), fx);
+        let bottom = between_pixels(image.pixel(x0, y1), image.pixel(x1, y1), fx);
+        between_pixels(top, bottom, fy)
     }
 
     /// The least and the greatest linear value of each channel (red, green, blue, alpha): no lookup leaves them.
@@ -253,7 +253,8 @@ fn bounds<T: Copy>(
 }
 
 /// A texture coordinate brought into 0 … 1 (both included).
-fn fold(t: f32, wrap: Wrap) -> f32 {
+#[inline(always)]
+pub(super) fn fold(t: f32, wrap: Wrap) -> f32 {
     if !t.is_finite() {
         return 0.0;
     }
@@ -283,8 +284,17 @@ fn neighbors(t: f32, size: u32, wrap: Wrap) -> (u32, u32, f32) {
 }
 
 /// Between two values, and never beyond either whatever the rounding.
-fn between(a: Vec4, b: Vec4, t: f32) -> Vec4 {
-    (a + (b - a) * t).clamp(a.min(b), a.max(b))
+#[inline(always)]
+pub(super) fn between(a: f32, b: f32, t: f32) -> f32 {
+    let (low, high) = if a < b { (a, b) } else { (b, a) };
+    let value = a + (b - a) * t;
+    let value = if value > low { value } else { low };
+    if value < high { value } else { high }
+}
+
+/// [`between`] of each channel.
+fn between_pixels(a: Vec4, b: Vec4, t: f32) -> Vec4 {
+    Vec4::from_array(std::array::from_fn(|channel| between(a[channel], b[channel], t)))
 }
 
 /// Decodes a PNG, JPEG, Radiance HDR or OpenEXR image; the content tells which, not the name.

@@ -10,14 +10,14 @@
 use smallvec::SmallVec;
 
 use super::ir::{
-    BoolBinary, Code, Column, FloatBinaryLoop, FloatTernaryLoop, FloatUnaryLoop, IntBinaryLoop, IntCheckedLoop, Kind,
-    LibraryLoop, MOST_ARGUMENTS, Noise,
+    BoolBinary, Code, Column, FloatBinaryLoop, FloatTernaryLoop, FloatUnary, FloatUnaryLoop, IntBinaryLoop,
+    IntCheckedLoop, Kind, LibraryLoop, MOST_ARGUMENTS, Noise,
 };
 use super::lower::TextureUse;
 use super::slice::{CarriedRegisters, LoopSteps, Register, Runnable, Step};
 use crate::math::{Vec2, Vec3, Vec4};
 use crate::shade::batch::{HitBatch, LightSample};
-use crate::shade::library::batch::noise as batch;
+use crate::shade::library::batch::{noise as batch, numeric, transcendental};
 use crate::shade::library::{hash, hit, math};
 use crate::shade::names::PathKind;
 use crate::shade::native::{NativeFunction, NativeType, NativeValue};
@@ -306,7 +306,14 @@ impl Registers {
         match code {
             Code::Float1(op) => {
                 let mut out = self.floats.take(results[0]);
-                op.in_loop(Unary { out: &mut out[..blocks], a: self.floats.view(operands[0]) });
+                let (blocks, a) = (&mut out[..blocks], self.floats.view(operands[0]));
+                match op {
+                    // These leave the loop for huge angles, so they come as whole blocks.
+                    FloatUnary::Sin => whole_blocks(blocks, a, transcendental::sin),
+                    FloatUnary::Cos => whole_blocks(blocks, a, transcendental::cos),
+                    FloatUnary::Tan => whole_blocks(blocks, a, transcendental::tan),
+                    _ => op.in_loop(Unary { out: blocks, a }),
+                }
                 self.floats.put(results[0], out);
             }
             Code::Float2(op) => {
@@ -423,10 +430,12 @@ impl Registers {
                 let views: [View<'_, f32>; 4] =
                     std::array::from_fn(|i| self.floats.view(operands[i.min(operands.len() - 1)]));
                 for (index, out) in out[..blocks].iter_mut().enumerate() {
-                    let blocks = views.map(|view| view.block(index));
-                    for lane in 0..LANES {
-                        let words = blocks.map(|block| block[lane]);
-                        out.0[lane] = hash::of_floats(seed, &words[..operands.len()]);
+                    let [a, b, c, d] = views.map(|view| view.block(index));
+                    match operands.len() {
+                        1 => numeric::seeded_hash([a], seed, &mut out.0),
+                        2 => numeric::seeded_hash([a, b], seed, &mut out.0),
+                        3 => numeric::seeded_hash([a, b, c], seed, &mut out.0),
+                        _ => numeric::seeded_hash([a, b, c, d], seed, &mut out.0),
                     }
                 }
                 self.floats.put(results[0], out);
@@ -495,14 +504,15 @@ impl Registers {
         let mut outs = [0, 1, 2, 3].map(|i| self.floats.take(results[i]));
         let (u, v) = (self.floats.view(operands[0]), self.floats.view(operands[1]));
         let width = operands.get(2).map(|width| self.floats.view(*width));
-        for row in 0..blocks * LANES {
-            let place = Vec2::new(u.row(row), v.row(row));
-            let color: Vec4 = match width {
-                Some(width) => texture.texture.sample_wide(place, width.row(row)),
-                None => texture.texture.sample(place),
-            };
-            for (out, x) in outs.iter_mut().zip(color.to_array()) {
-                out[row / LANES].0[row % LANES] = x;
+        for index in 0..blocks {
+            let (u, v) = (u.block(index), v.block(index));
+            let mut colors = [[0.0; LANES]; 4];
+            match width {
+                Some(width) => texture.texture.sample_wide_lanes(u, v, width.block(index), &mut colors),
+                None => texture.texture.sample_lanes(u, v, &mut colors),
+            }
+            for (out, color) in outs.iter_mut().zip(colors) {
+                out[index].0 = color;
             }
         }
         for (register, out) in results.iter().zip(outs) {
@@ -773,12 +783,22 @@ fn load<S: Copy, T: Copy>(out: &mut [Block<T>], source: &[S], chunk: &Chunk<'_>,
 }
 
 #[inline(always)]
-fn each<S: Copy, T>(out: &mut [Block<T>], a: View<'_, S>, formula: impl Fn(S) -> T) {
+fn each<S: Copy, T: Copy + Default>(out: &mut [Block<T>], a: View<'_, S>, formula: impl Fn(S) -> T) {
     for (index, out) in out.iter_mut().enumerate() {
-        let a = a.block(index);
+        // Only what cannot overlap is sure to become vector instructions: hence copies, here and below.
+        let a = *a.block(index);
+        let mut results = [T::default(); LANES];
         for lane in 0..LANES {
-            out.0[lane] = formula(a[lane]);
+            results[lane] = formula(a[lane]);
         }
+        out.0 = results;
+    }
+}
+
+#[inline(always)]
+fn whole_blocks(out: &mut [Block<f32>], a: View<'_, f32>, function: impl Fn(&[f32; LANES], &mut [f32; LANES])) {
+    for (index, out) in out.iter_mut().enumerate() {
+        function(a.block(index), &mut out.0);
     }
 }
 
@@ -804,12 +824,14 @@ fn compare<T: Copy>(
 }
 
 #[inline(always)]
-fn select<T: Copy>(out: &mut [Block<T>], mask: View<'_, u32>, a: View<'_, T>, b: View<'_, T>) {
+fn select<T: Copy + Default>(out: &mut [Block<T>], mask: View<'_, u32>, a: View<'_, T>, b: View<'_, T>) {
     for (index, out) in out.iter_mut().enumerate() {
-        let (mask, a, b) = (mask.block(index), a.block(index), b.block(index));
+        let (mask, a, b) = (*mask.block(index), *a.block(index), *b.block(index));
+        let mut results = [T::default(); LANES];
         for lane in 0..LANES {
-            out.0[lane] = if mask[lane] != 0 { a[lane] } else { b[lane] };
+            results[lane] = if mask[lane] != 0 { a[lane] } else { b[lane] };
         }
+        out.0 = results;
     }
 }
 
@@ -831,14 +853,16 @@ struct Binary<'a, T, R> {
     b: View<'a, T>,
 }
 
-impl<T: Copy, R> Binary<'_, T, R> {
+impl<T: Copy, R: Copy + Default> Binary<'_, T, R> {
     #[inline(always)]
     fn go(self, formula: impl Fn(T, T) -> R) {
         for (index, out) in self.out.iter_mut().enumerate() {
-            let (a, b) = (self.a.block(index), self.b.block(index));
+            let (a, b) = (*self.a.block(index), *self.b.block(index));
+            let mut results = [R::default(); LANES];
             for lane in 0..LANES {
-                out.0[lane] = formula(a[lane], b[lane]);
+                results[lane] = formula(a[lane], b[lane]);
             }
+            out.0 = results;
         }
     }
 }
@@ -868,10 +892,12 @@ impl FloatTernaryLoop for Ternary<'_> {
     #[inline(always)]
     fn run(self, formula: impl Fn(f32, f32, f32) -> f32) {
         for (index, out) in self.out.iter_mut().enumerate() {
-            let (a, b, c) = (self.a.block(index), self.b.block(index), self.c.block(index));
+            let (a, b, c) = (*self.a.block(index), *self.b.block(index), *self.c.block(index));
+            let mut results = [0.0; LANES];
             for lane in 0..LANES {
-                out.0[lane] = formula(a[lane], b[lane], c[lane]);
+                results[lane] = formula(a[lane], b[lane], c[lane]);
             }
+            out.0 = results;
         }
     }
 }

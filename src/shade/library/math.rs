@@ -339,13 +339,8 @@ pub(super) fn remap(x: f32, from_low: f32, from_high: f32, to_low: f32, to_high:
 /// -1, 0 or 1; a NaN stays.
 #[inline(always)]
 pub(in crate::shade) fn sign(x: f32) -> f32 {
-    if x > 0.0 {
-        1.0
-    } else if x < 0.0 {
-        -1.0
-    } else {
-        x
-    }
+    let up = if x > 0.0 { 1.0 } else { x };
+    if x < 0.0 { -1.0 } else { up }
 }
 
 /// `x - floor(x)`.

@@ -1,4 +1,7 @@
 //! Checks of batch forms against scalar forms, bit by bit, at every vector width of this CPU.
+//!
+//! Only that a result is no number counts, not which: sign and payload of a NaN depend on the order of operands, which
+//! compilers may change, and no script can tell one from another.
 
 use super::{LANES, Lanes};
 
@@ -105,9 +108,8 @@ pub fn same_bits<const N: usize, const M: usize>(
                     let arguments: [f32; N] = std::array::from_fn(|component| given[component][lane]);
                     let got: [f32; M] = std::array::from_fn(|component| out[component][lane]);
                     let wanted = scalar(arguments);
-                    assert_eq!(
-                        wanted.map(f32::to_bits),
-                        got.map(f32::to_bits),
+                    assert!(
+                        wanted.iter().zip(&got).all(|(a, b)| a.to_bits() == b.to_bits() || (a.is_nan() && b.is_nan())),
                         "{name}{arguments:?} is {wanted:?}, but {got:?} in a batch, {width:?}"
                     );
                 }

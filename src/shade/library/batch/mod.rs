@@ -4,11 +4,14 @@
 //! vector instructions. All are `inline(always)`: called from code that is compiled for wide vectors (`pulp`'s
 //! `Arch::dispatch` of a [`pulp::WithSimd`], whose `with_simd` is `inline(always)` too; a closure may not be inlined),
 //! they are as wide as that code. Only operations that IEEE 754 defines to the bit are used, and never a fused one, so a
-//! result depends neither on the width nor on the CPU. The scalar forms define the meaning; tests compare the bits.
+//! result depends neither on the width nor on the CPU. The scalar forms define the meaning; tests compare the
+//! bits. (Which NaN a result is counts no more than in scripts, which cannot tell one from another.)
 
 #[cfg(test)]
 mod check;
 pub mod noise;
+pub mod numeric;
+pub mod transcendental;
 
 /// Lanes of a block.
 pub const LANES: usize = 16;

@@ -28,15 +28,40 @@ fn round(x: f32) -> i32 {
     if x < 0.0 { whole.wrapping_neg() } else { whole }
 }
 
-/// The squared distance to the nearest point, and the hash of its cell.
+/// The points nearest to each lane's place.
+struct Nearest {
+    /// The squared distance to the nearest.
+    first: Lanes,
+    /// The squared distance to the next.
+    second: Lanes,
+    /// The hash of the cell of the nearest.
+    hash: [i32; LANES],
+}
+
+impl Nearest {
+    #[inline(always)]
+    fn new() -> Self {
+        Self { first: [f32::MAX; LANES], second: [f32::MAX; LANES], hash: [0; LANES] }
+    }
+
+    /// Sees another point of a lane.
+    #[inline(always)]
+    fn see(&mut self, lane: usize, squared: f32, hash: i32) {
+        let (first, second) = (self.first[lane], self.second[lane]);
+        let second = if squared < second { squared } else { second };
+        self.second[lane] = if second < first { first } else { second };
+        self.hash[lane] = if squared < first { hash } else { self.hash[lane] };
+        self.first[lane] = if squared < first { squared } else { first };
+    }
+}
+
 #[inline(always)]
-fn nearest_2d(x: &Lanes, y: &Lanes) -> (Lanes, [i32; LANES]) {
+fn nearest_2d(x: &Lanes, y: &Lanes) -> Nearest {
     let x: Lanes = std::array::from_fn(|i| clamp(x[i]));
     let y: Lanes = std::array::from_fn(|i| clamp(y[i]));
     let column: [i32; LANES] = std::array::from_fn(|i| round(x[i]));
     let row: [i32; LANES] = std::array::from_fn(|i| round(y[i]));
-    let mut distance = [f32::MAX; LANES];
-    let mut closest = [0; LANES];
+    let mut nearest = Nearest::new();
     for dx in -1..=1 {
         for dy in -1..=1 {
             for i in 0..LANES {
@@ -46,25 +71,22 @@ fn nearest_2d(x: &Lanes, y: &Lanes) -> (Lanes, [i32; LANES]) {
                 let to_x = (xi as f32 - x[i]) + X_2D[index];
                 let to_y = (yi as f32 - y[i]) + Y_2D[index];
                 let squared = to_x * to_x + to_y * to_y;
-                closest[i] = if squared < distance[i] { hash } else { closest[i] };
-                distance[i] = if squared < distance[i] { squared } else { distance[i] };
+                nearest.see(i, squared, hash);
             }
         }
     }
-    (distance, closest)
+    nearest
 }
 
-/// The squared distance to the nearest point, and the hash of its cell.
 #[inline(always)]
-fn nearest_3d(x: &Lanes, y: &Lanes, z: &Lanes) -> (Lanes, [i32; LANES]) {
+fn nearest_3d(x: &Lanes, y: &Lanes, z: &Lanes) -> Nearest {
     let x: Lanes = std::array::from_fn(|i| clamp(x[i]));
     let y: Lanes = std::array::from_fn(|i| clamp(y[i]));
     let z: Lanes = std::array::from_fn(|i| clamp(z[i]));
     let x0: [i32; LANES] = std::array::from_fn(|i| round(x[i]));
     let y0: [i32; LANES] = std::array::from_fn(|i| round(y[i]));
     let z0: [i32; LANES] = std::array::from_fn(|i| round(z[i]));
-    let mut distance = [f32::MAX; LANES];
-    let mut closest = [0; LANES];
+    let mut nearest = Nearest::new();
     for dx in -1..=1 {
         for dy in -1..=1 {
             for dz in -1..=1 {
@@ -77,21 +99,20 @@ fn nearest_3d(x: &Lanes, y: &Lanes, z: &Lanes) -> (Lanes, [i32; LANES]) {
                     let to_y = (yi as f32 - y[i]) + Y_3D[index];
                     let to_z = (zi as f32 - z[i]) + Z_3D[index];
                     let squared = to_x * to_x + to_y * to_y + to_z * to_z;
-                    closest[i] = if squared < distance[i] { hash } else { closest[i] };
-                    distance[i] = if squared < distance[i] { squared } else { distance[i] };
+                    nearest.see(i, squared, hash);
                 }
             }
         }
     }
-    (distance, closest)
+    nearest
 }
 
 /// `cellular_noise` of a vec2.
 #[inline(always)]
 pub fn cellular_noise_2d(x: &Lanes, y: &Lanes, out: &mut Lanes) {
-    let (distance, _) = nearest_2d(x, y);
+    let Nearest { first, .. } = nearest_2d(x, y);
     for i in 0..LANES {
-        let n = (distance[i].sqrt() - 1.0) + 1.0;
+        let n = (first[i].sqrt() - 1.0) + 1.0;
         out[i] = if x[i].is_nan() | y[i].is_nan() { f32::NAN } else { n };
     }
 }
@@ -99,9 +120,9 @@ pub fn cellular_noise_2d(x: &Lanes, y: &Lanes, out: &mut Lanes) {
 /// `cellular_noise` of a vec3.
 #[inline(always)]
 pub fn cellular_noise_3d(x: &Lanes, y: &Lanes, z: &Lanes, out: &mut Lanes) {
-    let (distance, _) = nearest_3d(x, y, z);
+    let Nearest { first, .. } = nearest_3d(x, y, z);
     for i in 0..LANES {
-        let n = (distance[i].sqrt() - 1.0) + 1.0;
+        let n = (first[i].sqrt() - 1.0) + 1.0;
         out[i] = if x[i].is_nan() | y[i].is_nan() | z[i].is_nan() { f32::NAN } else { n };
     }
 }
@@ -109,9 +130,9 @@ pub fn cellular_noise_3d(x: &Lanes, y: &Lanes, z: &Lanes, out: &mut Lanes) {
 /// `cell_id` of a vec2.
 #[inline(always)]
 pub fn cell_id_2d(x: &Lanes, y: &Lanes, out: &mut Lanes) {
-    let (_, closest) = nearest_2d(x, y);
+    let Nearest { hash, .. } = nearest_2d(x, y);
     for i in 0..LANES {
-        let n = 0.5 + 0.5 * (closest[i] as f32 * (1.0 / 2_147_483_648.0));
+        let n = 0.5 + 0.5 * (hash[i] as f32 * (1.0 / 2_147_483_648.0));
         out[i] = if x[i].is_nan() | y[i].is_nan() { f32::NAN } else { n };
     }
 }
@@ -119,9 +140,32 @@ pub fn cell_id_2d(x: &Lanes, y: &Lanes, out: &mut Lanes) {
 /// `cell_id` of a vec3.
 #[inline(always)]
 pub fn cell_id_3d(x: &Lanes, y: &Lanes, z: &Lanes, out: &mut Lanes) {
-    let (_, closest) = nearest_3d(x, y, z);
+    let Nearest { hash, .. } = nearest_3d(x, y, z);
     for i in 0..LANES {
-        let n = 0.5 + 0.5 * (closest[i] as f32 * (1.0 / 2_147_483_648.0));
+        let n = 0.5 + 0.5 * (hash[i] as f32 * (1.0 / 2_147_483_648.0));
         out[i] = if x[i].is_nan() | y[i].is_nan() | z[i].is_nan() { f32::NAN } else { n };
     }
+}
+
+/// F1 and F2 − F1 of each lane, less 1 and plus 1 again as the scalar form has it; NaN where `valid` is not.
+#[inline(always)]
+fn distances(nearest: &Nearest, valid: impl Fn(usize) -> bool, out: &mut [Lanes; 2]) {
+    for i in 0..LANES {
+        let (first, second) = (nearest.first[i].sqrt(), nearest.second[i].sqrt());
+        let (near, gap) = ((first - 1.0) + 1.0, (second - first - 1.0) + 1.0);
+        out[0][i] = if valid(i) { near } else { f32::NAN };
+        out[1][i] = if valid(i) { gap } else { f32::NAN };
+    }
+}
+
+/// `worley` of a vec2.
+#[inline(always)]
+pub fn worley_2d(x: &Lanes, y: &Lanes, out: &mut [Lanes; 2]) {
+    distances(&nearest_2d(x, y), |i| !(x[i].is_nan() | y[i].is_nan()), out);
+}
+
+/// `worley` of a vec3.
+#[inline(always)]
+pub fn worley_3d(x: &Lanes, y: &Lanes, z: &Lanes, out: &mut [Lanes; 2]) {
+    distances(&nearest_3d(x, y, z), |i| !(x[i].is_nan() | y[i].is_nan() | z[i].is_nan()), out);
 }

@@ -7,7 +7,7 @@
 mod cells;
 mod tables;
 
-pub use cells::{cell_id_2d, cell_id_3d, cellular_noise_2d, cellular_noise_3d};
+pub use cells::{cell_id_2d, cell_id_3d, cellular_noise_2d, cellular_noise_3d, worley_2d, worley_3d};
 
 use super::{LANES, Lanes};
 use tables::GRADIENTS_2D;
@@ -219,21 +219,21 @@ fn gradient_lanes_3d<const EXACT: bool>(x: &Lanes, y: &Lanes, z: &Lanes, out: &m
     zero
 }
 
-/// The strength of the first octave, with which the sum over all stays within ±1.
+/// The strength of the first of octaves that grow weaker by `gain`, with which their sum stays within ±1.
 #[inline(always)]
-fn bounding(octaves: u32) -> f32 {
-    let (mut amplitude, mut sum) = (0.5, 1.0);
+fn strongest(octaves: u32, gain: f32) -> f32 {
+    let (mut total, mut share) = (1.0, gain);
     for _ in 1..octaves {
-        sum += amplitude;
-        amplitude *= 0.5;
+        total += share;
+        share *= gain;
     }
-    1.0 / sum
+    1.0 / total
 }
 
 /// `fbm` of a vec2, with 1 to 10 octaves.
 #[inline(always)]
 pub fn fbm_2d(x: &Lanes, y: &Lanes, octaves: u32, out: &mut Lanes) {
-    let mut amplitude = bounding(octaves);
+    let mut amplitude = strongest(octaves, 0.5);
     let mut scale = 1.0;
     let mut sum = [0.0; LANES];
     for octave in 0..octaves {
@@ -252,7 +252,7 @@ pub fn fbm_2d(x: &Lanes, y: &Lanes, octaves: u32, out: &mut Lanes) {
 /// `fbm` of a vec3, with 1 to 10 octaves.
 #[inline(always)]
 pub fn fbm_3d(x: &Lanes, y: &Lanes, z: &Lanes, octaves: u32, out: &mut Lanes) {
-    let mut amplitude = bounding(octaves);
+    let mut amplitude = strongest(octaves, 0.5);
     let mut scale = 1.0;
     let mut sum = [0.0; LANES];
     for octave in 0..octaves {
@@ -264,6 +264,48 @@ pub fn fbm_3d(x: &Lanes, y: &Lanes, z: &Lanes, octaves: u32, out: &mut Lanes) {
         }
         amplitude *= 0.5;
         scale *= 2.0;
+    }
+    for i in 0..LANES {
+        out[i] = if x[i].is_nan() | y[i].is_nan() | z[i].is_nan() { f32::NAN } else { sum[i] };
+    }
+}
+
+/// `fbm` of a vec2, with 1 to 10 octaves, a lacunarity and a gain.
+#[inline(always)]
+pub fn layered_2d(x: &Lanes, y: &Lanes, octaves: u32, lacunarity: f32, gain: f32, out: &mut Lanes) {
+    let mut amplitude = strongest(octaves, gain);
+    let (mut px, mut py) = (*x, *y);
+    let mut sum = [0.0; LANES];
+    for octave in 0..octaves {
+        for i in 0..LANES {
+            let (x, y) = (clamp(px[i]), clamp(py[i]));
+            sum[i] += perlin_2d(SEED + octave as i32, [x, y], [floor(x), floor(y)]) * amplitude;
+            px[i] *= lacunarity;
+            py[i] *= lacunarity;
+        }
+        amplitude *= gain;
+    }
+    for i in 0..LANES {
+        out[i] = if x[i].is_nan() | y[i].is_nan() { f32::NAN } else { sum[i] };
+    }
+}
+
+/// `fbm` of a vec3, with 1 to 10 octaves, a lacunarity and a gain.
+#[inline(always)]
+pub fn layered_3d(x: &Lanes, y: &Lanes, z: &Lanes, octaves: u32, lacunarity: f32, gain: f32, out: &mut Lanes) {
+    let mut amplitude = strongest(octaves, gain);
+    let (mut px, mut py, mut pz) = (*x, *y, *z);
+    let mut sum = [0.0; LANES];
+    for octave in 0..octaves {
+        for i in 0..LANES {
+            let (x, y, z) = (clamp(px[i]), clamp(py[i]), clamp(pz[i]));
+            // As in `fbm_3d`, the sum starts at +0.
+            sum[i] += perlin_3d::<false>(SEED + octave as i32, [x, y, z], [floor(x), floor(y), floor(z)]) * amplitude;
+            px[i] *= lacunarity;
+            py[i] *= lacunarity;
+            pz[i] *= lacunarity;
+        }
+        amplitude *= gain;
     }
     for i in 0..LANES {
         out[i] = if x[i].is_nan() | y[i].is_nan() | z[i].is_nan() { f32::NAN } else { sum[i] };
@@ -314,7 +356,7 @@ pub fn value_noise_3d(x: &Lanes, y: &Lanes, z: &Lanes, out: &mut Lanes) {
 mod tests {
     use super::super::check::{Numbers, same_bits};
     use super::*;
-    use crate::shade::library::noise as scalar;
+    use crate::shade::library::{fractal, noise as scalar};
 
     const COUNT: usize = 200_000;
 
@@ -401,6 +443,52 @@ mod tests {
                 |p| [scalar::fbm(p, i64::from(octaves))],
                 |[x, y, z], [out]| {
                     fbm_3d(x, y, z, octaves, out);
+                },
+            );
+        }
+    }
+
+    #[test]
+    fn fractal_noise_is_the_same_in_batches() {
+        let mut numbers = Numbers::new(9);
+        let mut next = || [numbers.any(), numbers.any(), numbers.any()];
+        same_bits(
+            "worley",
+            COUNT,
+            &mut next,
+            |[x, y, _]| fractal::worley([x, y], None).to_array(),
+            |[x, y, _], out| {
+                worley_2d(x, y, out);
+            },
+        );
+        same_bits(
+            "worley",
+            COUNT,
+            &mut next,
+            |[x, y, z]| fractal::worley([x, y], Some(z)).to_array(),
+            |[x, y, z], out| {
+                worley_3d(x, y, z, out);
+            },
+        );
+        for (octaves, lacunarity, gain) in [(1, 2.0, 0.5), (3, 2.0, 0.5), (5, 2.3, 0.6), (10, 4.0, 1.0), (4, 1.0, 0.0)]
+        {
+            let of = |[x, y]: [f32; 2], z| [fractal::layered([x, y], z, octaves as usize, lacunarity, gain)];
+            same_bits(
+                "fbm",
+                COUNT / 5,
+                &mut next,
+                |[x, y, _]| of([x, y], None),
+                |[x, y, _], [out]| {
+                    layered_2d(x, y, octaves, lacunarity, gain, out);
+                },
+            );
+            same_bits(
+                "fbm",
+                COUNT / 5,
+                &mut next,
+                |[x, y, z]| of([x, y], Some(z)),
+                |[x, y, z], [out]| {
+                    layered_3d(x, y, z, octaves, lacunarity, gain, out);
                 },
             );
         }

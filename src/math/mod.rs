@@ -4,46 +4,11 @@
 //! CPU and with every C library. (`glam` is built with its `libm` feature for the same reason.) Add, multiply, divide
 //! and square root are exact IEEE operations and need no care.
 
+pub mod portable;
+
 pub use glam::{
     Affine2, DAffine3, DMat3, DMat4, DQuat, DVec2, DVec3, DVec4, Mat3, Mat4, Quat, Vec2, Vec3, Vec3A, Vec4,
 };
-
-/// Transcendental functions whose results do not depend on the machine.
-pub mod portable {
-    macro_rules! unary {
-        ($($name:ident = $f:ident),* $(,)?) => { $(
-            #[doc = concat!("`", stringify!($name), "`, by the pure-Rust `libm`.")]
-            #[inline]
-            #[must_use]
-            pub fn $name(x: f32) -> f32 { libm::$f(x) }
-        )* };
-    }
-    unary! {
-        sin = sinf, cos = cosf, tan = tanf, asin = asinf, acos = acosf, atan = atanf, sinh = sinhf, cosh = coshf,
-        tanh = tanhf, exp = expf, exp2 = exp2f, ln = logf, log2 = log2f, log10 = log10f, cbrt = cbrtf,
-    }
-
-    /// `sin` in double precision, for constants that are worked out once and must not be a rounding error off.
-    #[inline]
-    #[must_use]
-    pub fn sin_f64(x: f64) -> f64 {
-        libm::sin(x)
-    }
-
-    /// The angle of the vector (`x`, `y`) in radians, −π … π.
-    #[inline]
-    #[must_use]
-    pub fn atan2(y: f32, x: f32) -> f32 {
-        libm::atan2f(y, x)
-    }
-
-    /// `x` to the power `y`.
-    #[inline]
-    #[must_use]
-    pub fn pow(x: f32, y: f32) -> f32 {
-        libm::powf(x, y)
-    }
-}
 
 /// The luminance of a linear Rec. 709 colour.
 #[inline]
@@ -53,6 +18,7 @@ pub fn luminance(color: Vec3) -> f32 {
 }
 
 /// One linear component as an sRGB-encoded value; both 0 … 1, input clamped.
+#[inline(always)]
 #[must_use]
 pub fn srgb_from_linear(linear: f32) -> f32 {
     let x = linear.clamp(0.0, 1.0);
@@ -60,6 +26,7 @@ pub fn srgb_from_linear(linear: f32) -> f32 {
 }
 
 /// One sRGB-encoded component (0 … 1) as a linear value.
+#[inline(always)]
 #[must_use]
 pub fn linear_from_srgb(encoded: f32) -> f32 {
     if encoded <= 0.040_45 { encoded / 12.92 } else { portable::pow((encoded + 0.055) / 1.055, 2.4) }
