@@ -8,7 +8,7 @@ use rhai::Engine;
 use super::analysis::{self, Analysis, Finding};
 use super::host::Host;
 use super::kernel::{Kernel, Surroundings};
-use super::library::ParameterRecord;
+use super::library::{self, ParameterRecord};
 use super::names::{InputSet, OutputSet};
 use super::native::NativeFunction;
 use super::params::{self, Params};
@@ -195,13 +195,14 @@ impl Shaders {
     pub fn compile_for(scene: &Scene, host: &Host, mode: ShadingMode) -> Result<(Self, Diagnostics), Diagnostics> {
         let engine = host.engine(&BTreeSet::new(), scene.textures());
         let mut faults = host.check().err().unwrap_or_default();
+        let words = host.words();
         let mut keep = |result: Result<_, Diagnostics>| result.map_err(|found| faults.extend(found)).ok();
 
         let scripts: Vec<_> = scene
             .scripts()
             .iter()
             .map(|script| {
-                keep(Program::parse(&script.source, scene.script_files()).and_then(|program| {
+                keep(Program::parse(&script.source, scene.script_files(), &words).and_then(|program| {
                     let defaults = params::defaults(&program, &program.defaults(&engine)?)?;
                     Ok((Arc::new(program), defaults))
                 }))
@@ -209,7 +210,8 @@ impl Shaders {
             .collect();
 
         let textures: Arc<[Arc<Texture>]> = scene.textures().into();
-        let natives: Arc<[NativeFunction]> = host.natives().cloned().collect();
+        // A plug-in's functions come first: they replace those of the library.
+        let natives: Arc<[NativeFunction]> = host.natives().cloned().chain(library::natives()).collect();
         let mut shaders = Vec::new();
         for (index, material) in scene.materials().iter().enumerate() {
             let sets = scene.attributes().of_material(MaterialId::from_index(index));

@@ -449,7 +449,7 @@ fn captured_variables_are_copied_by_calls() {
     assert_script(
         "let a = [1.0]; let f = || a.len(); push(a, 2.0); #{ priority: a.len(), roughness: f.call() }",
         "inputs: all
-         incomplete: 1:70: `push`, which would change a variable that a closure captures, cannot be analysed",
+         incomplete: 1:57: `push`, which would change a variable that a closure captures, cannot be analysed",
     );
 }
 

@@ -298,6 +298,8 @@ pub(in crate::shade) enum Column {
     FrontFacing,
     Time,
     PixelsPerUnit,
+    Footprint,
+    UvFootprint,
     Curvature,
     LightCount,
 }

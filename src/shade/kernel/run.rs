@@ -613,6 +613,8 @@ impl Registers {
                     Column::Distance => load(&mut out, &hits.distance, chunk, |x| x),
                     Column::Depth => load(&mut out, &hits.depth, chunk, |x| x),
                     Column::PixelsPerUnit => load(&mut out, &hits.pixels_per_unit, chunk, |x| x),
+                    Column::Footprint => load(&mut out, &hits.footprint, chunk, |x| x),
+                    Column::UvFootprint => load(&mut out, &hits.uv_footprint, chunk, |x| x),
                     Column::Curvature => load(&mut out, &hits.curvature, chunk, |x| x),
                     _ => out[0] = Block([hits.time; LANES]),
                 }

@@ -551,6 +551,8 @@ fn input(code: Code) -> InputSet {
             Column::FrontFacing => InputSet::FRONT_FACING,
             Column::Time => InputSet::TIME,
             Column::PixelsPerUnit => InputSet::PIXELS_PER_UNIT,
+            Column::Footprint => InputSet::FOOTPRINT,
+            Column::UvFootprint => InputSet::UV_FOOTPRINT,
             Column::Curvature => InputSet::CURVATURE,
             Column::LightCount => InputSet::LIGHT_COUNT,
         },

@@ -11,7 +11,7 @@ use super::super::ir::{
 use super::meaning::{Channels, Meaning};
 use super::{Flow, Lowerer};
 use crate::scene::texture::TextureFilter;
-use crate::shade::native::NativeType;
+use crate::shade::native::{NativeFunction, NativeType};
 
 impl Lowerer<'_> {
     /// A call of a function that the script does not define, or an operator.
@@ -88,9 +88,13 @@ impl Lowerer<'_> {
         }))
     }
 
-    /// A function that a plug-in has added.
+    /// A function that a plug-in has added, or that is called as such: the first that takes these arguments.
     fn plug_in(&mut self, name: &str, arguments: &[Meaning]) -> Option<Meaning> {
-        let native = self.surroundings.natives.iter().find(|native| native.name() == name)?;
+        let all = self.surroundings.natives.iter().filter(|native| native.name() == name);
+        all.collect::<Vec<_>>().into_iter().find_map(|native| self.call_native(native, arguments))
+    }
+
+    fn call_native(&mut self, native: &NativeFunction, arguments: &[Meaning]) -> Option<Meaning> {
         if native.parameters().len() != arguments.len() {
             return None;
         }
@@ -143,6 +147,8 @@ impl Lowerer<'_> {
             "depth" => (Column::Depth, 1),
             "time" => (Column::Time, 1),
             "pixels_per_unit" => (Column::PixelsPerUnit, 1),
+            "footprint" => (Column::Footprint, 1),
+            "uv_footprint" => (Column::UvFootprint, 1),
             "curvature" => (Column::Curvature, 1),
             "object_id" => return Ok(Meaning::Int(self.builder.emit(Code::Input(Column::ObjectId, 0), &[]))),
             "polygon_id" => return Ok(Meaning::Int(self.builder.emit(Code::Input(Column::PolygonId, 0), &[]))),
