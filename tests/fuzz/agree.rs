@@ -7,6 +7,7 @@ use tusche::diag::{Diagnostics, Source};
 use tusche::math::{Affine2, DVec3, Vec2, Vec3, Vec4};
 use tusche::scene::camera::{Camera, Projection};
 use tusche::scene::ids::{MaterialId, TextureId};
+use tusche::scene::light::{Light, LightKind};
 use tusche::scene::material::{Material, ParamValue, Script};
 use tusche::scene::texture::{Image, Pixels, Texture, TextureFilter, TextureRef, Wrap};
 use tusche::scene::{Scene, SceneBuilder};
