@@ -256,12 +256,7 @@ enum Edit {
 }
 
 /// Gives every function a name of its own, and puts all into one table.
-fn join(
-    files: &[File],
-    known: &ScriptFiles,
-    words: &Words,
-    faults: &mut Diagnostics,
-) -> Result<Linked, Diagnostics> {
+fn join(files: &[File], known: &ScriptFiles, words: &Words, faults: &mut Diagnostics) -> Result<Linked, Diagnostics> {
     let mut tail = "__".to_owned();
     while files.iter().any(|file| file.source.text.contains(&tail)) {
         tail.push('_');
@@ -284,9 +279,7 @@ fn join(
         }
         let engine = host::parser(words, move |token, position| match (edits.get(&position), &token) {
             (Some(Edit::Word(name)), Token::Identifier(_)) => Token::Identifier(Box::new(name.as_str().into())),
-            (Some(Edit::Text(text)), Token::StringConstant(_)) => {
-                Token::StringConstant(Box::new(text.as_str().into()))
-            }
+            (Some(Edit::Text(text)), Token::StringConstant(_)) => Token::StringConstant(Box::new(text.as_str().into())),
             _ => token,
         });
         let ast = match compile(&engine, &file.source) {
@@ -389,7 +382,9 @@ fn edits(
                 edits.insert(first, Edit::Word(namespace.to_owned()));
                 edits.insert(word, Edit::Word(format!("{}{tail}{target}", call.name)));
             }
-            Err(fault) => faults.push(fault.at(span(&file.source, if call.namespace.path.len() > 1 { first } else { word }))),
+            Err(fault) => {
+                faults.push(fault.at(span(&file.source, if call.namespace.path.len() > 1 { first } else { word })))
+            }
         }
     });
     edits
@@ -435,12 +430,12 @@ fn callee(files: &[File], file: &File, call: &FnCallExpr, count: usize) -> Resul
 /// Shows every call in a file with its place.
 fn each_call(ast: &AST, mut see: impl FnMut(&FnCallExpr, Position)) {
     ast.walk(&mut |path| {
-        match path.last() {
-            Some(
-                ASTNode::Expr(Expr::FnCall(call, position) | Expr::MethodCall(call, position))
-                | ASTNode::Stmt(Stmt::FnCall(call, position)),
-            ) => see(call, *position),
-            _ => {}
+        if let Some(
+            ASTNode::Expr(Expr::FnCall(call, position) | Expr::MethodCall(call, position))
+            | ASTNode::Stmt(Stmt::FnCall(call, position)),
+        ) = path.last()
+        {
+            see(call, *position);
         }
         true
     });

@@ -15,6 +15,7 @@ use super::params::{self, Params};
 use super::script::Program;
 use crate::diag::{Diagnostic, Diagnostics};
 use crate::scene::Scene;
+use crate::scene::attributes::AttributeSet;
 use crate::scene::ids::MaterialId;
 use crate::scene::texture::Texture;
 
@@ -69,6 +70,9 @@ pub struct Shader {
     light_count: usize,
     textures: Arc<[Arc<Texture>]>,
     natives: Arc<[NativeFunction]>,
+    /// The scene's sets of attributes, and those that hits of the material can have.
+    attributes: Arc<Vec<AttributeSet>>,
+    attribute_sets: Vec<u32>,
 }
 
 impl Shader {
@@ -153,6 +157,8 @@ impl Shader {
         let surroundings = Surroundings {
             textures: &self.textures,
             natives: &self.natives,
+            attributes: &self.attributes,
+            attribute_sets: &self.attribute_sets,
             material_id: self.material_id,
             light_count: Some(light_count),
         };
@@ -239,6 +245,8 @@ impl Shaders {
                         light_count: scene.lights().len(),
                         textures: Arc::clone(&textures),
                         natives: Arc::clone(&natives),
+                        attributes: Arc::clone(scene.attributes().sets()),
+                        attribute_sets: sets.keys().copied().collect(),
                     };
                     if mode != ShadingMode::Interpreter && !shader.analysis.is_constant() {
                         shader.kernel = Some(shader.lower(shader.light_count));

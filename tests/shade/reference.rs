@@ -5,7 +5,7 @@ use crate::common::{golden, root};
 use tusche::files::FileStore;
 use tusche::scene::script_files;
 use tusche::shade::names::{INPUTS, OUTPUTS};
-use tusche::shade::{InputSet, library, reference};
+use tusche::shade::{InputSet, Mode, ShadingMode, library, reference};
 
 #[test]
 fn the_page_is_that_of_the_code() {
@@ -17,8 +17,7 @@ fn assert_works(script: &str) {
     let path = root().join("reference-of-a-test/main.rhai");
     let mut png = std::io::Cursor::new(Vec::new());
     image::DynamicImage::new_rgba8(2, 2).write_to(&mut png, image::ImageFormat::Png).expect("it is written");
-    let files =
-        FileStore::new().with_file(&path, script).with_file(path.with_file_name("grain.png"), png.into_inner());
+    let files = FileStore::new().with_file(&path, script).with_file(path.with_file_name("grain.png"), png.into_inner());
     let params = BTreeMap::from([("map".to_owned(), (texture(), None))]);
     let mut builder = scene_with(&[script], params).into_builder();
     builder.scripts[0] = Script { source: files.read_text(&path).expect("it is there"), path: Some(path) };
@@ -31,6 +30,17 @@ fn assert_works(script: &str) {
     assert_eq!(outputs.len, 2);
     let (shaders, _) = Shaders::compile(&scene, &Host::new()).expect("it compiled before");
     assert!(shaders.all()[0].analysis().complete, "{script}: {:?}", shaders.all()[0].analysis().blame);
+
+    // However it is run, it gives the same bits.
+    let (reference, _) = Shaders::compile_for(&scene, &Host::new(), ShadingMode::Interpreter).expect("it compiles");
+    let (mut interpreted, mut errors) = (OutputBatch::default(), ShadeErrors::default());
+    let hits = batch(2);
+    Shading::new(&scene, &reference).shade(MaterialId(0), &hits, OutputSet::all(), &mut interpreted, &mut errors);
+    let bits = |outputs: &OutputBatch| {
+        outputs.aovs.iter().flatten().flat_map(|aov| aov.to_array()).map(f32::to_bits).collect::<Vec<_>>()
+    };
+    assert_eq!(bits(&outputs), bits(&interpreted), "{script}");
+    assert!(shaders.all()[0].mode() != Mode::Interpreted, "{script}: {:?}", shaders.all()[0].blame());
 }
 
 #[test]

@@ -300,6 +300,7 @@ pub(in crate::shade) enum Column {
     PixelsPerUnit,
     Footprint,
     UvFootprint,
+    AttributeSet,
     Curvature,
     LightCount,
 }
@@ -307,7 +308,7 @@ pub(in crate::shade) enum Column {
 impl Column {
     pub fn kind(self) -> Kind {
         match self {
-            Self::ObjectId | Self::PolygonId | Self::PathKind | Self::LightCount => Kind::Int,
+            Self::ObjectId | Self::PolygonId | Self::PathKind | Self::LightCount | Self::AttributeSet => Kind::Int,
             Self::FrontFacing => Kind::Bool,
             _ => Kind::Float,
         }

@@ -624,6 +624,7 @@ impl Registers {
                 let mut out = self.ints.take(result);
                 match column {
                     Column::ObjectId => load(&mut out, &hits.object_id, chunk, i64::from),
+                    Column::AttributeSet => load(&mut out, &hits.attribute_set, chunk, i64::from),
                     Column::PolygonId => load(&mut out, &hits.polygon_id, chunk, i64::from),
                     Column::PathKind => load(&mut out, &hits.path_kind, chunk, PathKind::place),
                     _ => out[0] = Block([hits.light_count as i64; LANES]),

@@ -553,6 +553,7 @@ fn input(code: Code) -> InputSet {
             Column::PixelsPerUnit => InputSet::PIXELS_PER_UNIT,
             Column::Footprint => InputSet::FOOTPRINT,
             Column::UvFootprint => InputSet::UV_FOOTPRINT,
+            Column::AttributeSet => InputSet::ATTRIBUTE,
             Column::Curvature => InputSet::CURVATURE,
             Column::LightCount => InputSet::LIGHT_COUNT,
         },

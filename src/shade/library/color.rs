@@ -18,13 +18,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         types: "numbers → colour",
         example: "rgb(0.9, 0.5, 0.2)",
     },
-    Function {
-        name: "gray",
-        form: "gray(x)",
-        about: "rgb(x, x, x)",
-        types: "number → colour",
-        example: "gray(0.5)",
-    },
+    Function { name: "gray", form: "gray(x)", about: "rgb(x, x, x)", types: "number → colour", example: "gray(0.5)" },
     Function {
         name: "srgb",
         form: "srgb(r, g, b)",
@@ -237,13 +231,13 @@ pub(in crate::shade) fn temperature(kelvin: f32) -> Vec3 {
     let of_x = if kelvin <= 4000.0 {
         [-0.266_123_9, -0.234_358_9, 0.877_695_6, 0.179_91]
     } else {
-        [-3.025_846_9, 2.107_037_9, 0.222_634_7, 0.240_39]
+        [-3.025_847, 2.107_037_9, 0.222_634_7, 0.240_39]
     };
     let x = cubic(of_x, 1000.0 / kelvin);
     let of_y = if kelvin <= 2222.0 {
         [-1.106_381_4, -1.348_110_2, 2.185_558_3, -0.202_196_83]
     } else if kelvin <= 4000.0 {
-        [-0.954_947_6, -1.374_185_9, 2.091_370_2, -0.167_488_67]
+        [-0.954_947_6, -1.374_185_9, 2.091_37, -0.167_488_67]
     } else {
         [3.081_758, -5.873_387, 3.751_13, -0.370_014_83]
     };

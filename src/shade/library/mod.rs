@@ -32,8 +32,8 @@ use crate::scene::texture::Texture;
 
 pub(super) use hit::{ATTRIBUTE_TYPES, Hit, mistyped_attribute};
 pub(super) use math::CONSTANTS;
-pub(super) use operand::kind;
 pub(super) use natives::natives;
+pub(super) use operand::kind;
 pub(super) use parameters::ParameterRecord;
 pub(super) use texture::{texture_name, texture_of, unwritten_path};
 

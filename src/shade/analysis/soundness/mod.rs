@@ -140,7 +140,13 @@ impl Bench {
     fn new() -> Self {
         let pixels = Pixels::Rgba8 { data: vec![[51, 102, 0, 255], [102, 204, 0, 255]], srgb: false };
         let image = Arc::new(Image { width: 2, height: 1, pixels });
-        let texture = Texture { name: "two".into(), image, wrap: [Wrap::Repeat; 2], filter: TextureFilter::Linear, levels: OnceLock::new() };
+        let texture = Texture {
+            name: "two".into(),
+            image,
+            wrap: [Wrap::Repeat; 2],
+            filter: TextureFilter::Linear,
+            levels: OnceLock::new(),
+        };
         let wide = Texture { filter: TextureFilter::Mipmap, ..texture.clone() };
         let textures = vec![Arc::new(texture), Arc::new(wide)];
         let mip = TextureRef { texture: TextureId::from_index(1), uv_set: 0, transform: Affine2::IDENTITY };
@@ -250,7 +256,8 @@ fn hidden_dependence(
 /// Parses and analyses a script. `None` if the analysis gave up.
 fn claims(bench: &Bench, text: &str) -> Result<Option<(Program, Analysis)>, String> {
     let source = Arc::new(Source { name: "generated.rhai".into(), text: text.into() });
-    let program = Program::parse(&source, &ScriptFiles::default(), &Host::new().words()).map_err(|faults| format!("{faults}\n{text}"))?;
+    let program = Program::parse(&source, &ScriptFiles::default(), &Host::new().words())
+        .map_err(|faults| format!("{faults}\n{text}"))?;
     let sets = attribute_sets();
     let attributes: Vec<&AttributeSet> = sets.iter().collect();
     let found = analyse_program(&program, &bench.params, &bench.textures, &attributes);

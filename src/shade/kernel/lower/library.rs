@@ -1,6 +1,7 @@
 //! The library's functions and the inputs, as instructions that do the same steps in the same order.
 
 use std::rc::Rc;
+use std::sync::Arc;
 
 use rhai::Position;
 
@@ -10,7 +11,9 @@ use super::super::ir::{
 };
 use super::meaning::{Channels, Meaning};
 use super::{Flow, Lowerer};
-use crate::scene::texture::TextureFilter;
+use crate::math::{Affine2, Vec2, Vec4};
+use crate::scene::texture::{TextureFilter, TextureRef};
+use crate::shade::library::texture_of;
 use crate::shade::native::{NativeFunction, NativeType};
 
 impl Lowerer<'_> {
@@ -39,12 +42,24 @@ impl Lowerer<'_> {
         }
         match (name, arguments) {
             ("light", [Meaning::Hit, Meaning::Int(index)]) => Ok(Some(self.light(*index))),
-            ("texture", [Meaning::Hit, Meaning::Texture(texture)])
-                if self.textures[*texture].texture.filter == TextureFilter::Mipmap =>
-            {
-                self.give_up(position, "a texture with mipmaps")
+            ("attribute", [Meaning::Hit, Meaning::Text(name), default]) => {
+                Ok(self.attribute(&Rc::clone(name), default))
             }
-            ("texture", [Meaning::Hit, Meaning::Texture(texture)]) => Ok(Some(self.texture_at_hit(*texture))),
+            ("texture", [Meaning::Hit, Meaning::Texture(texture)]) => Ok(self.texture_at_hit(*texture)),
+            ("texture", [Meaning::Texture(texture), Meaning::Vector(uv), width]) if uv.len() == 2 => {
+                let Some(width) = self.number(width) else { return Ok(None) };
+                Ok(self.wide_texture(*texture, [uv[0], uv[1]], width))
+            }
+            ("texture", [Meaning::Text(name), Meaning::Vector(uv), ..]) if uv.len() == 2 => {
+                let Some(id) = texture_of(name) else { return Ok(None) };
+                let Some(texture) = self.surroundings.textures.get(id.index()) else { return Ok(None) };
+                let place = TextureRef { texture: id, uv_set: 0, transform: Affine2::IDENTITY };
+                let uv = [uv[0], uv[1]];
+                match self.texture_use(Arc::clone(texture), place) {
+                    Meaning::Texture(texture) => Ok(Some(self.texture(texture, uv))),
+                    _ => Ok(None),
+                }
+            }
             ("texture", [Meaning::Texture(texture), Meaning::Vector(uv)]) if uv.len() == 2 => {
                 Ok(Some(self.texture(*texture, [uv[0], uv[1]])))
             }
@@ -94,7 +109,7 @@ impl Lowerer<'_> {
         all.collect::<Vec<_>>().into_iter().find_map(|native| self.call_native(native, arguments))
     }
 
-    fn call_native(&mut self, native: &NativeFunction, arguments: &[Meaning]) -> Option<Meaning> {
+    pub(super) fn call_native(&mut self, native: &NativeFunction, arguments: &[Meaning]) -> Option<Meaning> {
         if native.parameters().len() != arguments.len() {
             return None;
         }
@@ -207,7 +222,7 @@ impl Lowerer<'_> {
     // Textures.
 
     /// As `Affine2::transform_point2` of the mesh's texture coordinates.
-    fn texture_at_hit(&mut self, texture: usize) -> Meaning {
+    fn texture_at_hit(&mut self, texture: usize) -> Option<Meaning> {
         let place = self.textures[texture].place;
         let [u, v] = [0, 1].map(|lane| self.builder.emit(Code::Input(Column::Uv(place.uv_set), lane), &[]));
         let (m, t) = (place.transform.matrix2, place.transform.translation);
@@ -217,7 +232,21 @@ impl Lowerer<'_> {
             let sum = self.float2(FloatBinary::Add, along, across);
             self.float2(FloatBinary::Add, sum, Operand::float(t))
         });
-        self.texture(texture, uv)
+        if self.textures[texture].texture.filter != TextureFilter::Mipmap {
+            return Some(self.texture(texture, uv));
+        }
+        let scale = m.determinant().abs().sqrt();
+        let footprint = self.builder.emit(Code::Input(Column::UvFootprint, 0), &[]);
+        let width = self.float2(FloatBinary::Multiply, footprint, Operand::float(scale));
+        self.wide_texture(texture, uv, width)
+    }
+
+    /// A lookup for a pixel that covers some width of uv.
+    fn wide_texture(&mut self, texture: usize, uv: [Operand; 2], width: Operand) -> Option<Meaning> {
+        let texture = Arc::clone(&self.textures[texture].texture);
+        let look_up = move |uv: Vec2, width: f32| -> Vec4 { texture.sample_wide(uv, width) };
+        let native = NativeFunction::new("texture", look_up);
+        self.call_native(&native, &[Meaning::Vector(uv.into_iter().collect()), Meaning::Float(width)])
     }
 
     fn texture(&mut self, texture: usize, uv: [Operand; 2]) -> Meaning {

@@ -14,6 +14,7 @@
 //! A variable is a *cell*. Ordinary cells matter only at live hits. *Exit* cells (a function's result so far, what
 //! variables were where a loop was left) matter at hits that are not live any more, and are joined with care for them.
 
+mod attributes;
 mod chains;
 mod expressions;
 mod library;
@@ -30,6 +31,7 @@ use rhai::Position;
 use self::meaning::{Channels, Field, Meaning, Record};
 use super::build::Builder;
 use super::ir::{Block, Code, Comparison, Item, Operand, ValueType};
+use crate::scene::attributes::AttributeSet;
 use crate::scene::texture::{Texture, TextureRef};
 use crate::shade::analysis::Finding;
 use crate::shade::host::{MAX_CALL_DEPTH, MAX_OPERATIONS};
@@ -98,6 +100,9 @@ pub(in crate::shade) struct Surroundings<'a> {
     pub material_id: u32,
     /// Functions that plug-ins have added.
     pub natives: &'a [NativeFunction],
+    /// The scene's sets of attributes, and which of them hits of the material can have.
+    pub attributes: &'a [AttributeSet],
+    pub attribute_sets: &'a [u32],
     /// Lights in the scene; `None` if the same kernel must serve any number.
     pub light_count: Option<usize>,
 }
