@@ -8,7 +8,7 @@ use rhai::Engine;
 use super::analysis::{self, Analysis, Finding};
 use super::host::Host;
 use super::kernel::{Kernel, Surroundings};
-use super::library::{self, ParameterRecord};
+use super::library::ParameterRecord;
 use super::names::{InputSet, OutputSet};
 use super::native::NativeFunction;
 use super::params::{self, Params};
@@ -70,9 +70,7 @@ pub struct Shader {
     light_count: usize,
     textures: Arc<[Arc<Texture>]>,
     natives: Arc<[NativeFunction]>,
-    /// The scene's sets of attributes, and those that hits of the material can have.
-    attributes: Arc<Vec<AttributeSet>>,
-    attribute_sets: Vec<u32>,
+    pub(super) attributes: Arc<Vec<AttributeSet>>,
 }
 
 impl Shader {
@@ -156,9 +154,8 @@ impl Shader {
     fn lower(&self, light_count: usize) -> Result<Arc<Kernel>, Finding> {
         let surroundings = Surroundings {
             textures: &self.textures,
-            natives: &self.natives,
             attributes: &self.attributes,
-            attribute_sets: &self.attribute_sets,
+            natives: &self.natives,
             material_id: self.material_id,
             light_count: Some(light_count),
         };
@@ -216,8 +213,7 @@ impl Shaders {
             .collect();
 
         let textures: Arc<[Arc<Texture>]> = scene.textures().into();
-        // A plug-in's functions come first: they replace those of the library.
-        let natives: Arc<[NativeFunction]> = host.natives().cloned().chain(library::natives()).collect();
+        let natives: Arc<[NativeFunction]> = host.natives().cloned().collect();
         let mut shaders = Vec::new();
         for (index, material) in scene.materials().iter().enumerate() {
             let sets = scene.attributes().of_material(MaterialId::from_index(index));
@@ -246,7 +242,6 @@ impl Shaders {
                         textures: Arc::clone(&textures),
                         natives: Arc::clone(&natives),
                         attributes: Arc::clone(scene.attributes().sets()),
-                        attribute_sets: sets.keys().copied().collect(),
                     };
                     if mode != ShadingMode::Interpreter && !shader.analysis.is_constant() {
                         shader.kernel = Some(shader.lower(shader.light_count));

@@ -102,21 +102,6 @@ pub(in crate::shade) fn layered(xy: [f32; 2], z: Option<f32>, octaves: usize, la
     sum
 }
 
-/// The number of octaves, if it and the other arguments are within their ranges.
-pub(super) fn layers(octaves: i64, lacunarity: f32, gain: f32) -> Result<usize, Fault> {
-    let refused = |what: String| Err(Fault::new(format!("`fbm` takes {what}")));
-    if !(1..=MAX_OCTAVES).contains(&octaves) {
-        return refused(format!("1 to {MAX_OCTAVES} octaves, not {octaves}"));
-    }
-    if !(1.0..=4.0).contains(&lacunarity) {
-        return refused(format!("a lacunarity of 1 to 4, not {lacunarity}"));
-    }
-    if !(0.0..=1.0).contains(&gain) {
-        return refused(format!("a gain of 0 to 1, not {gain}"));
-    }
-    Ok(octaves as usize)
-}
-
 fn point(name: &str, value: &Dynamic) -> Outcome<([f32; 2], Option<f32>)> {
     match Operand::of(value) {
         Some(Operand::Vec2(v)) => Ok(([v.x, v.y], None)),
@@ -130,6 +115,16 @@ pub(super) fn register(engine: &mut Engine) {
     engine.register_fn("fbm", |place: Dynamic, octaves: i64, lacunarity: Dynamic, gain: Dynamic| -> Outcome<f32> {
         let (xy, z) = point("fbm", &place)?;
         let (lacunarity, gain) = (number("fbm", &lacunarity)?, number("fbm", &gain)?);
-        Ok(layered(xy, z, layers(octaves, lacunarity, gain)?, lacunarity, gain))
+        let refused = |what: String| -> Outcome<f32> { Err(Fault::new(format!("`fbm` takes {what}")).into()) };
+        if !(1..=MAX_OCTAVES).contains(&octaves) {
+            return refused(format!("1 to {MAX_OCTAVES} octaves, not {octaves}"));
+        }
+        if !(1.0..=4.0).contains(&lacunarity) {
+            return refused(format!("a lacunarity of 1 to 4, not {lacunarity}"));
+        }
+        if !(0.0..=1.0).contains(&gain) {
+            return refused(format!("a gain of 0 to 1, not {gain}"));
+        }
+        Ok(layered(xy, z, octaves as usize, lacunarity, gain))
     });
 }

@@ -13,7 +13,6 @@ pub(in crate::shade) mod fractal;
 pub(in crate::shade) mod hash;
 pub(in crate::shade) mod hit;
 pub(in crate::shade) mod math;
-mod natives;
 pub(in crate::shade) mod noise;
 mod operand;
 mod parameters;
@@ -32,7 +31,6 @@ use crate::scene::texture::Texture;
 
 pub(super) use hit::{ATTRIBUTE_TYPES, Hit, mistyped_attribute};
 pub(super) use math::CONSTANTS;
-pub(super) use natives::natives;
 pub(super) use operand::kind;
 pub(super) use parameters::ParameterRecord;
 pub(super) use texture::{texture_name, texture_of, unwritten_path};

@@ -14,7 +14,6 @@
 //! A variable is a *cell*. Ordinary cells matter only at live hits. *Exit* cells (a function's result so far, what
 //! variables were where a loop was left) matter at hits that are not live any more, and are joined with care for them.
 
-mod attributes;
 mod chains;
 mod expressions;
 mod library;
@@ -98,11 +97,10 @@ pub(in crate::shade) struct Surroundings<'a> {
     pub textures: &'a [Arc<Texture>],
     /// Material number, from 1, as `hit.material_id`.
     pub material_id: u32,
+    /// The scene's sets of attributes.
+    pub attributes: &'a Arc<Vec<AttributeSet>>,
     /// Functions that plug-ins have added.
     pub natives: &'a [NativeFunction],
-    /// The scene's sets of attributes, and which of them hits of the material can have.
-    pub attributes: &'a [AttributeSet],
-    pub attribute_sets: &'a [u32],
     /// Lights in the scene; `None` if the same kernel must serve any number.
     pub light_count: Option<usize>,
 }
