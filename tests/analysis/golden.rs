@@ -563,3 +563,16 @@ fn hostile_scripts_end() {
         assert!(found.outputs.len() > 1);
     }
 }
+
+#[test]
+fn attributes_are_listed() {
+    // No object has any here, so they are their defaults.
+    assert_script(
+        r#"#{ roughness: hit.attribute("wear", 0.25), priority: hit.attribute("rank", 2), base_color: hit.attribute("tint", hit.color.rgb) }"#,
+        "inputs: color
+         attributes: rank tint wear
+         base_color: always, [-1e18, 1e18], from color
+         roughness: always, [0.25, 0.25], constant
+         priority: always, [2.0, 2.0], constant",
+    );
+}
