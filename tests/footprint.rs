@@ -9,6 +9,11 @@ const SIZE: usize = 32;
 
 /// Renders a scene whose shaders `show` (the footprint as a colour) and `mirror` are at hand.
 fn rendered(objects: &str) -> Picture {
+    rendered_with("gray(hit.footprint)", objects)
+}
+
+/// The same with another colour.
+fn rendered_with(color: &str, objects: &str) -> Picture {
     let path = root().join("scenes/test.toml");
     let text = format!(
         "[render]\nsize = [{SIZE}, {SIZE}]\nsamples = 1\nfilter = \"box\"\nfilter_radius = 0.5\n\
@@ -16,12 +21,10 @@ fn rendered(objects: &str) -> Picture {
          [materials.show]\nshader = \"show.rhai\"\n[materials.mirror]\nshader = \"mirror.rhai\"\n{objects}"
     );
     let mirror = "fn surface(hit, p) { #{ base_color: 1.0, metallic: 1.0, roughness: 0.0, line_width: 0.0 } }";
+    let show = format!("fn surface(hit, p) {{ #{{ color: {color}, line_width: 0 }} }}");
     let files = FileStore::new()
         .with_file(&path, text)
-        .with_file(
-            root().join("scenes/show.rhai"),
-            "fn surface(hit, p) { #{ color: gray(hit.footprint), line_width: 0 } }",
-        )
+        .with_file(root().join("scenes/show.rhai"), show)
         .with_file(root().join("scenes/mirror.rhai"), mirror);
     let loaded = tusche::scene::file::load(&path, &files, &[], &Default::default());
     let (builder, _) = loaded.unwrap_or_else(|faults| panic!("{faults}"));
@@ -41,6 +44,17 @@ fn assert_close(found: f32, expected: f64, tolerance: f64) {
 }
 
 const MIDDLE: usize = SIZE / 2;
+
+#[test]
+fn the_other_inputs_follow_it() {
+    let plane = "[[objects]]\nshape = \"plane\"\nsize = 100\nrotate = [90, 0, 0]\ntranslate = [0, 0, -3]\nmaterial = \"show\"\n";
+    let width = rendered(plane).at(0, MIDDLE, MIDDLE);
+    // The plane is one unit of uv wide.
+    let uv = rendered_with("gray(hit.uv_footprint * 100.0)", plane).at(0, MIDDLE, MIDDLE);
+    assert_close(uv, f64::from(width), 1e-3);
+    let pixels = rendered_with("gray(1.0 / hit.pixels_per_unit)", plane).at(0, MIDDLE, MIDDLE);
+    assert_close(pixels, f64::from(width), 1e-5);
+}
 
 #[test]
 fn straight_on_it_grows_with_the_distance() {

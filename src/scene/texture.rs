@@ -152,8 +152,7 @@ impl Texture {
     pub fn sample_wide(&self, uv: Vec2, width: f32) -> Vec4 {
         let image = &*self.image;
         let pixels = width * (image.width as f32 * image.height as f32).sqrt();
-        // Also where the width is no number.
-        if self.filter != TextureFilter::Mipmap || !(pixels > 1.0) {
+        if self.filter != TextureFilter::Mipmap || pixels <= 1.0 || pixels.is_nan() {
             return self.sample(uv);
         }
         let levels = self.levels.get_or_init(|| smaller(image));

@@ -163,22 +163,27 @@ impl Host {
         }
         native::register(&mut engine, &self.natives().cloned().collect::<Vec<_>>());
         confine(&mut engine);
-        if !self.constants.is_empty() {
-            let constants = self.constants.clone();
-            #[allow(deprecated, reason = "marked so only because it may change; the version of rhai is pinned")]
-            engine.on_parse_token(move |token, _, _| replace(constant(&constants, token)));
-        }
         engine
+    }
+
+    /// What the words of scripts stand for here.
+    pub(super) fn words(&self) -> Words {
+        let constants = self.constants.clone();
+        Arc::new(move |token| replace(constant(&constants, token)))
     }
 }
 
-/// An engine that parses scripts as the host's engines do, but can run none. `edit` sees each token, with its place,
-/// and gives the token to go on with.
-pub(super) fn parser(edit: impl Fn(Token, Position) -> Token + Send + Sync + 'static) -> Engine {
+/// Replaces words that stand for something else.
+pub(super) type Words = Arc<dyn Fn(Token) -> Token + Send + Sync>;
+
+/// An engine that parses scripts, but can run none. `edit` sees each token behind `words`, with its place, and gives the
+/// token to go on with.
+pub(super) fn parser(words: &Words, edit: impl Fn(Token, Position) -> Token + Send + Sync + 'static) -> Engine {
+    let words = Arc::clone(words);
     let mut engine = Engine::new_raw();
     confine(&mut engine);
     #[allow(deprecated, reason = "marked so only because it may change; the version of rhai is pinned")]
-    engine.on_parse_token(move |token, place, _| edit(replace(token), place));
+    engine.on_parse_token(move |token, place, _| edit(words(token), place));
     engine
 }
 
@@ -201,8 +206,6 @@ fn confine(engine: &mut Engine) {
         .set_fail_on_invalid_map_property(true)
         .on_print(|_| {})
         .on_debug(|_, _, _| {});
-    #[allow(deprecated, reason = "marked so only because it may change; the version of rhai is pinned")]
-    engine.on_parse_token(|token, _, _| replace(token));
 }
 
 /// A registered constant in place of its name.

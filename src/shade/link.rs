@@ -16,7 +16,7 @@ use rhai::{AST, ASTNode, Engine, Expr, FnAccess, FnCallExpr, Module, Position, S
 
 use super::closures;
 use super::fault::{Fault, from_parse_error, span};
-use super::host::{self, MAX_FUNCTIONS, MAX_SCRIPT};
+use super::host::{self, Host, MAX_FUNCTIONS, MAX_SCRIPT, Words};
 use super::library;
 use super::script::{Functions, ScriptFunction, name_span};
 use crate::diag::{Diagnostic, Diagnostics, Source, Span, nearest};
@@ -55,8 +55,8 @@ struct File {
 }
 
 /// Parses a script and the modules that it imports.
-pub(super) fn link(source: &Arc<Source>, known: &ScriptFiles) -> Result<Linked, Diagnostics> {
-    let mut linker = Linker { known, files: Vec::new(), chain: Vec::new(), faults: Diagnostics::default() };
+pub(super) fn link(source: &Arc<Source>, known: &ScriptFiles, words: &Words) -> Result<Linked, Diagnostics> {
+    let mut linker = Linker { known, words, files: Vec::new(), chain: Vec::new(), faults: Diagnostics::default() };
     linker.open(source);
     let Linker { files, mut faults, .. } = linker;
     let files: Vec<File> = files.into_iter().flatten().collect();
@@ -70,7 +70,7 @@ pub(super) fn link(source: &Arc<Source>, known: &ScriptFiles) -> Result<Linked, 
             add_functions(&mut functions, source, &only.ast, 0, "");
             Linked { files: vec![Arc::clone(source)], ast: only.ast.clone(), functions, module: None }
         }
-        _ => join(&files, known, &mut faults)?,
+        _ => join(&files, known, words, &mut faults)?,
     };
     for (index, file) in linked.files.iter().enumerate() {
         closures::check(&linked.functions, file, index, &mut faults);
@@ -81,6 +81,7 @@ pub(super) fn link(source: &Arc<Source>, known: &ScriptFiles) -> Result<Linked, 
 
 struct Linker<'a> {
     known: &'a ScriptFiles,
+    words: &'a Words,
     /// In the order in which they were opened; `None` while, or if, a file is not complete.
     files: Vec<Option<File>>,
     /// Files whose imports are being followed, outermost first.
@@ -93,7 +94,7 @@ impl Linker<'_> {
     fn open(&mut self, source: &Arc<Source>) -> usize {
         let index = self.files.len();
         self.files.push(None);
-        let (ast, tokens) = match parse(source) {
+        let (ast, tokens) = match parse(source, self.words) {
             Ok(parsed) => parsed,
             Err(fault) => {
                 self.faults.push(fault);
@@ -176,12 +177,19 @@ fn import(statement: &Stmt) -> Result<Option<Import>, (Fault, Position)> {
 
 /// The imports at the head of a script, for those who look up its files; none if it cannot be parsed.
 pub(super) fn imports(source: &Arc<Source>) -> Vec<Import> {
-    let parsed = parse(source);
-    let statements = parsed.iter().flat_map(|(ast, _)| ast.statements());
+    let parsed = glance(source);
+    let statements = parsed.iter().flat_map(AST::statements);
     statements.filter_map(|statement| import(statement).ok().flatten()).collect()
 }
 
-fn parse(source: &Arc<Source>) -> Result<(AST, Vec<(Token, Position)>), Diagnostic> {
+/// Parses a script for what it names, whatever a plug-in may have added to the language.
+fn glance(source: &Arc<Source>) -> Option<AST> {
+    let mut engine = host::parser(&Host::new().words(), |token, _| token);
+    engine.set_strict_variables(false);
+    compile(&engine, source).ok().filter(|_| source.text.len() <= MAX_SCRIPT)
+}
+
+fn parse(source: &Arc<Source>, words: &Words) -> Result<(AST, Vec<(Token, Position)>), Diagnostic> {
     let size = source.text.len();
     if size > MAX_SCRIPT {
         let fault = Diagnostic::error(format!("a script may have at most {MAX_SCRIPT} bytes, and this has {size}"));
@@ -189,7 +197,7 @@ fn parse(source: &Arc<Source>) -> Result<(AST, Vec<(Token, Position)>), Diagnost
     }
     let tokens = Arc::new(Mutex::new(Vec::new()));
     let seen = Arc::clone(&tokens);
-    let engine = host::parser(move |token, position| {
+    let engine = host::parser(words, move |token, position| {
         seen.lock().unwrap_or_else(PoisonError::into_inner).push((token.clone(), position));
         token
     });
@@ -238,7 +246,7 @@ pub(super) fn textures(ast: &AST) -> Vec<NamedTexture> {
 
 /// The images that a script names, for those who look them up; none if it cannot be parsed.
 pub(super) fn named_textures(source: &Arc<Source>) -> Vec<NamedTexture> {
-    parse(source).map_or_else(|_| Vec::new(), |(ast, _)| textures(&ast))
+    glance(source).map_or_else(Vec::new, |ast| textures(&ast))
 }
 
 /// What a word or a text becomes in the second parse.
@@ -248,7 +256,7 @@ enum Edit {
 }
 
 /// Gives every function a name of its own, and puts all into one table.
-fn join(files: &[File], known: &ScriptFiles, faults: &mut Diagnostics) -> Result<Linked, Diagnostics> {
+fn join(files: &[File], known: &ScriptFiles, words: &Words, faults: &mut Diagnostics) -> Result<Linked, Diagnostics> {
     let mut tail = "__".to_owned();
     while files.iter().any(|file| file.source.text.contains(&tail)) {
         tail.push('_');
@@ -269,7 +277,7 @@ fn join(files: &[File], known: &ScriptFiles, faults: &mut Diagnostics) -> Result
                 ),
             }
         }
-        let engine = host::parser(move |token, position| match (edits.get(&position), &token) {
+        let engine = host::parser(words, move |token, position| match (edits.get(&position), &token) {
             (Some(Edit::Word(name)), Token::Identifier(_)) => Token::Identifier(Box::new(name.as_str().into())),
             (Some(Edit::Text(text)), Token::StringConstant(_)) => Token::StringConstant(Box::new(text.as_str().into())),
             _ => token,
@@ -422,12 +430,12 @@ fn callee(files: &[File], file: &File, call: &FnCallExpr, count: usize) -> Resul
 /// Shows every call in a file with its place.
 fn each_call(ast: &AST, mut see: impl FnMut(&FnCallExpr, Position)) {
     ast.walk(&mut |path| {
-        match path.last() {
-            Some(
-                ASTNode::Expr(Expr::FnCall(call, position) | Expr::MethodCall(call, position))
-                | ASTNode::Stmt(Stmt::FnCall(call, position)),
-            ) => see(call, *position),
-            _ => {}
+        if let Some(
+            ASTNode::Expr(Expr::FnCall(call, position) | Expr::MethodCall(call, position))
+            | ASTNode::Stmt(Stmt::FnCall(call, position)),
+        ) = path.last()
+        {
+            see(call, *position);
         }
         true
     });

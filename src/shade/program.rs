@@ -198,13 +198,14 @@ impl Shaders {
     pub fn compile_for(scene: &Scene, host: &Host, mode: ShadingMode) -> Result<(Self, Diagnostics), Diagnostics> {
         let engine = host.engine(&BTreeSet::new(), scene.textures());
         let mut faults = host.check().err().unwrap_or_default();
+        let words = host.words();
         let mut keep = |result: Result<_, Diagnostics>| result.map_err(|found| faults.extend(found)).ok();
 
         let scripts: Vec<_> = scene
             .scripts()
             .iter()
             .map(|script| {
-                keep(Program::parse(&script.source, scene.script_files()).and_then(|program| {
+                keep(Program::parse(&script.source, scene.script_files(), &words).and_then(|program| {
                     let defaults = params::defaults(&program, &program.defaults(&engine)?)?;
                     Ok((Arc::new(program), defaults))
                 }))

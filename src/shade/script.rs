@@ -10,6 +10,7 @@ use rhai::{
 use super::analysis::Finding;
 use super::closures;
 use super::fault::{Fault, from_run, span};
+use super::host::Words;
 use super::link::{Linked, link};
 use super::names::AOV_PREFIX;
 use super::native;
@@ -80,9 +81,9 @@ impl std::fmt::Debug for Function {
 }
 
 impl Program {
-    /// Parses a script with its modules, and checks their functions. `files` are the scene's.
-    pub fn parse(source: &Arc<Source>, files: &ScriptFiles) -> Result<Self, Diagnostics> {
-        let Linked { files, ast, functions, module } = link(source, files)?;
+    /// Parses a script with its modules, and checks their functions. `files` are the scene's, `words` the host's.
+    pub fn parse(source: &Arc<Source>, files: &ScriptFiles, words: &Words) -> Result<Self, Diagnostics> {
+        let Linked { files, ast, functions, module } = link(source, files, words)?;
         let mut faults = Diagnostics::default();
         let surface = Self::find(&functions, "surface", 2, "surface(hit, p)", &mut faults);
         if surface.is_none() && !faults.has_errors() {

@@ -90,9 +90,6 @@ impl TileTracer<'_> {
         hits.material_id = material.0 + 1;
         hits.time = self.scene.time();
         hits.light_count = self.lighting.len();
-        if plan.inputs.contains(InputSet::ATTRIBUTE) {
-            hits.attributes = Arc::clone(self.scene.attributes().sets());
-        }
         if plan.inputs.intersects(InputSet::LIGHTS) {
             hits.lights.extend_from_slice(lights);
         }
@@ -174,6 +171,9 @@ impl TileTracer<'_> {
             }
         }
         if inputs.contains(InputSet::ATTRIBUTE) {
+            if batch.len == 1 {
+                batch.attributes = Arc::clone(self.scene.attributes().sets());
+            }
             batch.attribute_set.push(self.scene.attributes().of(hit.hit.object, hit.material));
         }
         if inputs.contains(InputSet::CURVATURE) {

@@ -449,7 +449,7 @@ fn captured_variables_are_copied_by_calls() {
     assert_script(
         "let a = [1.0]; let f = || a.len(); push(a, 2.0); #{ priority: a.len(), roughness: f.call() }",
         "inputs: all
-         incomplete: 1:70: `push`, which would change a variable that a closure captures, cannot be analysed",
+         incomplete: 1:57: `push`, which would change a variable that a closure captures, cannot be analysed",
     );
 }
 
@@ -562,4 +562,17 @@ fn hostile_scripts_end() {
         let found = started.expect("threads can be started").join().expect("the analysis does not panic");
         assert!(found.outputs.len() > 1);
     }
+}
+
+#[test]
+fn attributes_are_listed() {
+    // No object has any here, so they are their defaults.
+    assert_script(
+        r#"#{ roughness: hit.attribute("wear", 0.25), priority: hit.attribute("rank", 2), base_color: hit.attribute("tint", hit.color.rgb) }"#,
+        "inputs: color
+         attributes: rank tint wear
+         base_color: always, [-1e18, 1e18], from color
+         roughness: always, [0.25, 0.25], constant
+         priority: always, [2.0, 2.0], constant",
+    );
 }

@@ -11,7 +11,7 @@ use tusche::scene::light::LightKind;
 use tusche::scene::material::ParamValue;
 use tusche::scene::settings::{Background, Composition, FilterKind, LineSettings, RayKinds, RenderSettings};
 use tusche::scene::shape::Shape;
-use tusche::scene::texture::{TextureFilter, Wrap};
+use tusche::scene::texture::{Pixels, TextureFilter, Wrap};
 
 use super::{load_with, loaded, store};
 
@@ -98,6 +98,10 @@ fn materials_and_their_parameters() {
     assert_eq!(value("paint"), ParamValue::Vec3(Vec3::new(0.1, 0.2, 0.3)));
     assert_eq!(value("rect"), ParamValue::Vec4(Vec4::new(1.0, 2.0, 3.0, 4.0)));
     assert_eq!(value("mode"), ParamValue::Text("wet".to_owned()));
+    let ParamValue::Texture(paper) = value("paper") else { panic!() };
+    let texture = &scene.textures[paper.texture.index()];
+    assert_eq!((texture.wrap, texture.filter), ([Wrap::Clamp; 2], TextureFilter::Linear));
+    assert!(matches!(texture.image.pixels, Pixels::Rgba8 { srgb: false, .. }));
     let ParamValue::Texture(grain) = value("grain") else { panic!() };
     let texture = &scene.textures[grain.texture.index()];
     assert_eq!((texture.wrap, texture.filter), ([Wrap::Mirror; 2], TextureFilter::Nearest));

@@ -4,6 +4,7 @@ use super::*;
 use crate::common::{load, scene_from};
 use tusche::film::Layer;
 use tusche::scene::attributes::{Attribute, AttributeSet};
+use tusche::shade::ShadingMode;
 
 /// The colour of a material with this body on an object with attributes, or what is said.
 fn try_shade(body: &str, attributes: &[(&str, Attribute)]) -> Result<Vec3, String> {
@@ -32,6 +33,11 @@ fn try_shade(body: &str, attributes: &[(&str, Attribute)]) -> Result<Vec3, Strin
     }
     let (mut outputs, mut errors) = (OutputBatch::default(), ShadeErrors::default());
     Shading::new(&scene, &shaders).shade(MaterialId(0), &hits, OutputSet::all(), &mut outputs, &mut errors);
+    let (reference, _) =
+        Shaders::compile_for(&scene, &Host::new(), ShadingMode::Interpreter).expect("it compiled before");
+    let (mut interpreted, mut same) = (OutputBatch::default(), ShadeErrors::default());
+    Shading::new(&scene, &reference).shade(MaterialId(0), &hits, OutputSet::all(), &mut interpreted, &mut same);
+    assert_eq!((&outputs.color, errors.is_empty()), (&interpreted.color, same.is_empty()), "{body}");
     if errors.is_empty() { Ok(outputs.color[0].expect("a colour")) } else { Err(rendered(&errors.into_diagnostics())) }
 }
 

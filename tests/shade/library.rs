@@ -296,3 +296,73 @@ fn functions_of_a_rust_user_are_called() {
     assert!(errors.is_empty());
     assert_eq!(outputs.line_width, [Some(0.25)]);
 }
+
+#[test]
+fn patterns() {
+    assert_gives("stripes(0.5, 0.3)", 1.0);
+    assert_gives("stripes(1, 0.3)", 0.0);
+    assert_gives("stripes(0.5, 0.3, 100)", 0.3);
+    assert_gives("checker(vec2(0.5, 1.5))", 1.0);
+    assert_gives("checker(vec3(0.5, 1.5, -0.5), 0)", 0.0);
+    assert_gives("checker(vec2(1, 1), 2)", 0.5);
+    assert_gives("dots(vec2(3.5, 2.5), 0.1)", 1.0);
+    assert_gives("dots(vec2(3, 2), 0.5)", 0.0);
+    assert_gives("hatch(vec2(0, 0.5), 0.1)", 1.0);
+    assert_gives("cross_hatch(vec2(0.5, 0), 0.9)", 1.0);
+    assert_gives("cross_hatch(vec2(0.5, 0), 0.4)", 0.0);
+    assert_holds("length(rotate(vec2(1, 0), PI / 2) - vec2(0, 1)) < 0.000001");
+}
+
+#[test]
+fn worley_and_layered_noise() {
+    assert_holds("worley(hit.position * 3.0).x == cellular_noise(hit.position * 3.0)");
+    assert_holds("worley(vec2(0.3, 7.2)).y >= 0.0 && worley(hit.uv).x < 1.5");
+    for octaves in 1..=10 {
+        assert_holds(&format!("fbm(hit.position * 7.0, {octaves}, 2.0, 0.5) == fbm(hit.position * 7.0, {octaves})"));
+        assert_holds(&format!("fbm(hit.uv * 7.0, {octaves}, 2, 0.5) == fbm(hit.uv * 7.0, {octaves})"));
+    }
+    assert_holds("fbm(hit.position, 4, 3.0, 0.3) != fbm(hit.position, 4)");
+    assert_holds("is_nan(worley(vec2(0.0 / 0.0, 1)).x)");
+}
+
+#[test]
+fn wrong_arguments_of_patterns_and_colors() {
+    for (expression, said) in [
+        ("stripes(vec2(1, 2), 0.5)", "it is called as `stripes(x, width)`"),
+        ("stripes(0.5, 0.5, \"a\")", "it is called as `stripes(x, width, filter)`"),
+        ("checker(1.0)", "it is called as `checker(point)`"),
+        ("checker(vec4(1.0), 0.1)", "it is called as `checker(point, filter)`"),
+        ("dots(vec3(1.0), 0.5)", "`dots` cannot be called with (vec3, float)"),
+        ("hatch(hit.uv, hit.uv)", "`hatch` cannot be called with (vec2, vec2)"),
+        ("cross_hatch(1, 2, 3)", "`cross_hatch` cannot be called with (int, int, int)"),
+        ("rotate(vec3(1.0), 1)", "`rotate` cannot be called with (vec3, int)"),
+        ("worley(1.0)", "`worley` cannot be called with (float)"),
+        ("fbm(hit.uv, 11, 2.0, 0.5)", "`fbm` takes 1 to 10 octaves, not 11"),
+        ("fbm(hit.uv, 3, 0.5, 0.5)", "`fbm` takes a lacunarity of 1 to 4, not 0.5"),
+        ("fbm(hit.uv, 3, 2.0, -1)", "`fbm` takes a gain of 0 to 1, not -1"),
+        ("hsl(hit.uv, 1, 1)", "`hsl` cannot be called with (vec2, int, int)"),
+        ("oklab(\"a\", 1, 1)", "`oklab` cannot be called with"),
+        ("mix_oklab(rgb(1, 0, 0), 1.0, 0.5)", "it is called as `mix_oklab(a, b, t)`"),
+        ("temperature(rgb(1, 0, 0))", "`temperature` cannot be called with (vec3)"),
+        ("srgb_from_rgb(1.0)", "it is called as `srgb_from_rgb(color)`"),
+    ] {
+        let found = complaint(&format!("fn surface(hit, p) {{\n    #{{ aov_x: {expression} }}\n}}"));
+        assert!(found.contains(said) && found.contains("first.rhai:2:"), "{expression}: {found}");
+    }
+}
+
+#[test]
+fn color_spaces() {
+    assert_gives("hsl(0.0, 1.0, 0.5)", [1.0, 0.0, 0.0]);
+    assert_gives("hsl_from_rgb(rgb(1, 0, 0))", [0.0, 1.0, 0.5]);
+    assert_holds(
+        "srgb_from_rgb(rgb(0, 1, 7)).r == 0.0 && length(srgb_from_rgb(rgb(0, 1, 7)) - rgb(0, 1, 1)) < 0.000001",
+    );
+    assert_holds("length(srgb(srgb_from_rgb(rgb(0.2, 0.5, 0.9))) - rgb(0.2, 0.5, 0.9)) < 0.000001");
+    assert_holds("length(oklab(oklab_from_rgb(rgb(0.2, 0.5, 0.9))) - rgb(0.2, 0.5, 0.9)) < 0.00001");
+    assert_holds("length(oklch(oklch_from_rgb(rgb(0.2, 0.5, 0.9))) - rgb(0.2, 0.5, 0.9)) < 0.00001");
+    let middle = "oklab_from_rgb(mix_oklab(rgb(0, 0, 1), rgb(1, 1, 1), 0.5))";
+    let mean = "(oklab_from_rgb(rgb(0, 0, 1)) + oklab_from_rgb(rgb(1, 1, 1))) / 2";
+    assert_holds(&format!("length({middle} - {mean}) < 0.00001"));
+    assert_holds("temperature(2000).r == 1.0 && temperature(2000).b < 0.1");
+}

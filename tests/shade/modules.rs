@@ -83,6 +83,30 @@ fn own_functions_shadow_the_library_by_their_number_of_parameters() {
 }
 
 #[test]
+fn calls_are_found_wherever_they_stand() {
+    let files = [
+        (
+            "main.rhai",
+            "import \"a\" as a;\nfn surface(hit, p) { #{ color: vec3(a::of(3), a::of(4), if `${a::of(5)}` == \"5.0\" { 3 } else { 9 }) } }",
+        ),
+        (
+            "a.rhai",
+            "fn one() { 1.0 }
+             fn two(x) { x * 2.0 }
+             fn of(x) {
+                 let sum = switch x { 3 if one() > 0.5 => two(one()), 4 => if `${two(one())}` == \"2.0\" { 3.0 } else { 9.0 }, _ => one() };
+                 for i in 0..x { if two(i) > 2.0 && one() == 1.0 { break; } sum += two(one()); }
+                 while one() > sum { sum += one(); }
+                 let r = #{ a: [two(1.0)] };
+                 r.a[0] += one();
+                 return sum + r.a[0] - two(one()) - one();
+             }",
+        ),
+    ];
+    assert_eq!(try_shade(&files), Ok(Vec3::new(6.0, 7.0, 3.0)));
+}
+
+#[test]
 fn methods_of_modules_work_within_them() {
     let files = [
         ("main.rhai", "import \"a\" as a;\nfn surface(hit, p) { #{ color: gray(a::of(3.0)) } }"),

@@ -5,7 +5,7 @@ use crate::common::{golden, root};
 use tusche::files::FileStore;
 use tusche::scene::script_files;
 use tusche::shade::names::{INPUTS, OUTPUTS};
-use tusche::shade::{InputSet, library, reference};
+use tusche::shade::{InputSet, Mode, ShadingMode, library, reference};
 
 #[test]
 fn the_page_is_that_of_the_code() {
@@ -30,6 +30,17 @@ fn assert_works(script: &str) {
     assert_eq!(outputs.len, 2);
     let (shaders, _) = Shaders::compile(&scene, &Host::new()).expect("it compiled before");
     assert!(shaders.all()[0].analysis().complete, "{script}: {:?}", shaders.all()[0].analysis().blame);
+
+    // However it is run, it gives the same bits.
+    let (reference, _) = Shaders::compile_for(&scene, &Host::new(), ShadingMode::Interpreter).expect("it compiles");
+    let (mut interpreted, mut errors) = (OutputBatch::default(), ShadeErrors::default());
+    let hits = batch(2);
+    Shading::new(&scene, &reference).shade(MaterialId(0), &hits, OutputSet::all(), &mut interpreted, &mut errors);
+    let bits = |outputs: &OutputBatch| {
+        outputs.aovs.iter().flatten().flat_map(|aov| aov.to_array()).map(f32::to_bits).collect::<Vec<_>>()
+    };
+    assert_eq!(bits(&outputs), bits(&interpreted), "{script}");
+    assert!(shaders.all()[0].mode() != Mode::Interpreted, "{script}: {:?}", shaders.all()[0].blame());
 }
 
 #[test]

@@ -91,7 +91,7 @@ fn paths_are_written_out() {
     let words = ["the path of an image must be written out as a text where it is looked up"];
     assert_said(
         "{ let name = \"grain.png\"; let uv = texture(\"grain.png\", hit.uv); texture(name, hit.uv).rgb }",
-        "2:83",
+        "2:80",
         &words,
     );
     assert_said("texture(\"grain\" + \".png\", texture(\"grain.png\", hit.uv).xy).rgb", "2:15", &words);

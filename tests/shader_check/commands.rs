@@ -36,6 +36,26 @@ fn the_document_for_editors_is_as_recorded() {
 }
 
 #[test]
+fn the_reference_is_printed() {
+    let place = Workplace::new();
+    let run = place.run(&["shader", "reference"]).exits(0);
+    assert_eq!(run.stdout(), fs::read_to_string(root().join("shaders/README.md")).expect("it is shipped"));
+}
+
+#[test]
+fn modules_are_checked_with_the_script_that_imports_them() {
+    let place = Workplace::new();
+    place.file("look.rhai", "import \"lib/ink\" as ink;\nfn surface(hit, p) { #{ line_width: ink::width(hit) } }\n");
+    place.file("lib/ink.rhai", "fn width(hit) { 2.0 + helper(hit) }\nprivate fn helper(hit) { hit.uv.x }\n");
+    place.run(&["shader", "check", "look.rhai"]).exits(0);
+    place.file("lib/ink.rhai", "fn width(hit) {\n    hit.positon.x\n}\n");
+    let run = place.run(&["shader", "check", "look.rhai"]).exits(1).says("did you mean `position`?");
+    assert!(run.stderr().contains("lib/ink.rhai:2:9"), "{}", run.stderr());
+    place.file("look.rhai", "import \"lib/inc\" as ink;\nfn surface(hit, p) { #{} }\n");
+    place.run(&["shader", "check", "look.rhai"]).exits(1).says("look.rhai:1:8").says("did you mean `ink.rhai`?");
+}
+
+#[test]
 fn files_that_are_no_scripts_are_said() {
     let place = Workplace::new();
     place.file("latin.rhai", b"fn surface(hit, p) { #{} } // \xe9");

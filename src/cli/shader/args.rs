@@ -16,6 +16,8 @@ pub enum ShaderCommand {
     New(NewArguments),
     /// Renders shaders on a ball and a knot.
     Preview(PreviewArguments),
+    /// Prints the reference of the shading language as Markdown: every input, output and function.
+    Reference,
 }
 
 /// Which shaders, with which parameters.

@@ -9,11 +9,12 @@ mod preview;
 
 use std::path::Path;
 
-use super::Failure;
+use super::{Failure, print};
 use crate::diag::Diagnostics;
 use crate::files::FileStore;
 use crate::scene::ids::MaterialId;
 use crate::scene::{Scene, SceneBuilder, file};
+use crate::shade::reference;
 pub(super) use args::ShaderCommand;
 
 pub(super) fn run(command: &ShaderCommand) -> Result<(), Failure> {
@@ -22,6 +23,7 @@ pub(super) fn run(command: &ShaderCommand) -> Result<(), Failure> {
         ShaderCommand::Bench(arguments) => bench::run(arguments),
         ShaderCommand::New(arguments) => new::run(arguments),
         ShaderCommand::Preview(arguments) => preview::run(arguments),
+        ShaderCommand::Reference => print(&reference::markdown()),
     }
 }
 

@@ -256,7 +256,8 @@ fn hidden_dependence(
 /// Parses and analyses a script. `None` if the analysis gave up.
 fn claims(bench: &Bench, text: &str) -> Result<Option<(Program, Analysis)>, String> {
     let source = Arc::new(Source { name: "generated.rhai".into(), text: text.into() });
-    let program = Program::parse(&source, &ScriptFiles::default()).map_err(|faults| format!("{faults}\n{text}"))?;
+    let program = Program::parse(&source, &ScriptFiles::default(), &Host::new().words())
+        .map_err(|faults| format!("{faults}\n{text}"))?;
     let sets = attribute_sets();
     let attributes: Vec<&AttributeSet> = sets.iter().collect();
     let found = analyse_program(&program, &bench.params, &bench.textures, &attributes);
