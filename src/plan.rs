@@ -12,7 +12,7 @@ use crate::scene::ids::MaterialId;
 use crate::scene::settings::{Background, FilterKind, LineSettings, RayKinds};
 use crate::shade::analysis::OutputFact;
 use crate::shade::bsdf::MIRROR_ROUGHNESS;
-use crate::shade::{Analysis, InputSet, Mode, OutputSet, Shader, Shaders};
+use crate::shade::{InputSet, Mode, OutputSet, Shader, Shaders};
 
 /// What rendering does with the hits of one material.
 #[derive(Clone, Debug, PartialEq)]
@@ -101,7 +101,7 @@ impl Plan {
 
         let lines = plan_lines(scene, shaders, layers, &used);
         for (material, shader) in materials.iter_mut().zip(shaders.iter()) {
-            let may = may_write(shader.analysis());
+            let may = shader.analysis().writable();
             if lines.is_some() {
                 material.wanted |= may & (OutputSet::LINE_COLOR | OutputSet::LINE_WIDTH | OutputSet::PRIORITY);
             }
@@ -178,10 +178,6 @@ fn used_materials(scene: &Scene) -> Vec<bool> {
     used
 }
 
-fn may_write(analysis: &Analysis) -> OutputSet {
-    OutputSet::all().iter().filter(|output| analysis.output(*output).may).collect()
-}
-
 /// Least and greatest value an output can have, with its default where the script may leave it out; `None` if unknown.
 fn bounds(fact: &OutputFact, default: f32) -> Option<[f32; 2]> {
     if !fact.may {
@@ -218,7 +214,7 @@ fn plan_material(shader: &Shader, lights: bool, color: bool, used: bool) -> Mate
         wanted |= OutputSet::BSDF | OutputSet::COLOR;
     }
     MaterialPlan {
-        wanted: wanted & may_write(analysis),
+        wanted: wanted & analysis.writable(),
         inputs: InputSet::empty(),
         mode: shader.mode(),
         lit,

@@ -8,6 +8,7 @@ mod gltf;
 mod scene_file;
 // ... scripts and what is known of them, ...
 mod analysis;
+mod kernel;
 mod plan;
 mod shade;
 mod shader_check;

@@ -7,6 +7,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use crate::line::Method;
 use crate::sample::PixelRect;
+use crate::shade::ShadingMode;
 
 /// Draws feature lines of ray-traced scenes, styled by Rhai scripts.
 #[derive(Debug, Parser)]
@@ -122,6 +123,9 @@ pub struct SceneArguments {
     /// How lines are found: `exact` is fast, `brute` tries every pair and gives the same picture.
     #[arg(long, value_name = "HOW", default_value = "exact")]
     pub lines: LineMode,
+    /// How shaders are run: `kernel` refuses scripts that cannot be compiled, `interpreter` gives the same picture slowly.
+    #[arg(long, value_name = "HOW", default_value = "auto")]
+    pub shading: Shading,
     /// Says nothing but errors.
     #[arg(short, long)]
     pub quiet: bool,
@@ -160,6 +164,23 @@ pub enum LineMode {
 impl LineMode {
     pub fn method(self) -> Method {
         if self == Self::Brute { Method::Brute } else { Method::Exact }
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Shading {
+    Auto,
+    Kernel,
+    Interpreter,
+}
+
+impl Shading {
+    pub fn mode(self) -> ShadingMode {
+        match self {
+            Self::Auto => ShadingMode::Auto,
+            Self::Kernel => ShadingMode::Kernel,
+            Self::Interpreter => ShadingMode::Interpreter,
+        }
     }
 }
 

@@ -31,7 +31,7 @@ impl Request {
         let files = FileStore::new();
         let (builder, mut warnings) = load(arguments, frame, &files)?;
         let scene = builder.build()?;
-        let (shaders, more) = Shaders::compile(&scene, &Host::new())?;
+        let (shaders, more) = Shaders::compile_for(&scene, &Host::new(), arguments.shading.mode())?;
         warnings.extend(more);
         if !arguments.quiet {
             terminal::say(&warnings);

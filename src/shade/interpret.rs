@@ -136,6 +136,12 @@ impl<'a> Shading<'a> {
         self.evaluations
     }
 
+    /// The outputs that a material's shader may write: what a plan asks of it at most.
+    #[must_use]
+    pub fn writable(&self, material: MaterialId) -> OutputSet {
+        self.shaders.of(material).analysis().writable()
+    }
+
     /// Shades a batch of hits of one material. Columns of `wanted`, and all extra outputs, are filled (an output that
     /// the shader never writes gets its default), others are left empty. A hit whose script fails gets the marker:
     /// `color` (1, 0, 1), no line, all else default.

@@ -11,7 +11,7 @@ use crate::scene::ids::MaterialId;
 /// Shortest time that one measurement takes, in seconds: far above the resolution of clocks.
 const LEAST_SECONDS: f64 = 0.002;
 
-/// Nanoseconds of CPU time for each hit of a batch, all outputs wanted: the median of `repeats` measurements, after a
+/// Nanoseconds of CPU time for each hit of a batch, with all outputs wanted that the shader may write: the median of `repeats` measurements, after a
 /// first round that warms caches and is not counted. 0 for an empty batch.
 #[must_use]
 pub fn nanoseconds_per_hit(shading: &mut Shading<'_>, material: MaterialId, hits: &HitBatch, repeats: usize) -> f64 {
@@ -19,9 +19,10 @@ pub fn nanoseconds_per_hit(shading: &mut Shading<'_>, material: MaterialId, hits
         return 0.0;
     }
     let mut outputs = OutputBatch::default();
+    let wanted = shading.writable(material);
     let mut shade = |shading: &mut Shading<'_>| {
         let mut errors = ShadeErrors::default();
-        shading.shade(material, hits, OutputSet::all(), &mut outputs, &mut errors);
+        shading.shade(material, hits, wanted, &mut outputs, &mut errors);
     };
     shade(shading);
     let measured = (0..repeats.max(1)).map(|_| {

@@ -194,6 +194,12 @@ impl Analysis {
         &self.outputs[output.bits().trailing_zeros() as usize]
     }
 
+    /// The outputs that may be in the record.
+    #[must_use]
+    pub fn writable(&self) -> OutputSet {
+        OutputSet::all().iter().filter(|output| self.output(*output).may).collect()
+    }
+
     /// Whether every output is the same at all hits, so that one evaluation serves the whole material.
     #[must_use]
     pub fn is_constant(&self) -> bool {
