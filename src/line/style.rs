@@ -27,8 +27,8 @@ impl LineType {
 /// The line that a target sees, in its colours.
 pub(super) fn style(window: &PathWindow<'_>, targets: &PathTile<'_>, found: &Found, rules: &Rules) -> Option<SeenLine> {
     let pair = &found.pair;
-    let neighbors = window.tiles[pair.tile].as_ref()?;
-    let (styling, row) = if pair.own { (targets.nodes, found.row) } else { (neighbors.nodes, pair.row) };
+    let neighbors = window.tiles[pair.tile as usize].as_ref()?;
+    let (styling, row) = if pair.own { (targets.nodes, found.row) } else { (neighbors.nodes, pair.row as usize) };
     let line_color = Vec3::from(styling.line_color.get(row));
     let alpha = rules.alpha(styling.line_width.get(row));
 
@@ -52,8 +52,8 @@ pub(super) fn style(window: &PathWindow<'_>, targets: &PathTile<'_>, found: &Fou
         alpha,
         lined: lined.to_array(),
         path: found.path,
-        fired: rules.tests().fired(&features(targets.nodes, found.row), &features(neighbors.nodes, pair.row)),
-        neighbor: (pair.pixel, neighbors.nodes.sample[pair.row] % spp),
+        fired: rules.tests().fired(&features(targets.nodes, found.row), &features(neighbors.nodes, pair.row as usize)),
+        neighbor: (pair.pixel, neighbors.nodes.sample[pair.row as usize] % spp),
         own: pair.own,
     })
 }

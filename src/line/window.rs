@@ -138,7 +138,7 @@ impl<'a> PathTile<'a> {
 
     #[inline(always)]
     pub(super) fn rank(&self, row: usize) -> Rank {
-        Rank { priority: self.nodes.priority.get(row), depth: self.nodes.depth.get(row) }
+        Rank::new(self.nodes.priority.get(row), self.nodes.depth.get(row))
     }
 
     #[inline(always)]
