@@ -248,6 +248,9 @@ fn plan_lines(scene: &Scene, shaders: &Shaders, layers: &[Layer], used: &[bool])
         return None;
     }
     let rules = Rules::new(settings, scene.render().samples).with_widest(widest);
+    // Only layers by type tell why a line is there.
+    let by_type = layers.iter().any(|layer| matches!(layer, Layer::LineType(_)));
+    let rules = if by_type { rules } else { rules.with_any_pair() };
     let reach = rules.reach();
     Some(LinePlan { rules, widest, reach })
 }

@@ -8,12 +8,13 @@
 //! Bounds of uv, normals and feature colours ([`Shape`]) lie apart from the others ([`Bounds`]) and exist only where a
 //! test reads them: what is scanned most stays small.
 
-use super::differ::{Features, Tests};
+use super::differ::Tests;
 use super::pair::Rank;
 use super::rules::Rules;
+use super::window::style;
 use crate::sample::{Column, NodeColumns, NodePath, PixelRect, SampleBuffer};
 
-/// Side of a block in pixels. At 16 px and 16 samples, blocks of 4 cost 1.3 times the time of 8, blocks of 16 1.2 times.
+/// Side of a block in pixels.
 const BLOCK: i32 = 8;
 
 /// What the line pass knows of a tile of samples before it starts. Made once per tile, when it has been traced.
@@ -129,15 +130,6 @@ impl Shape {
         }
     }
 
-    #[inline]
-    fn of_node(features: &Features) -> Self {
-        Self {
-            uv: Extent::point(features.uv),
-            normal: Extent::point(features.normal),
-            feature: Extent::point(features.feature),
-        }
-    }
-
     /// Whether hits here and there may differ.
     #[inline]
     fn may_differ(&self, other: &Self, tests: &Tests) -> bool {
@@ -176,6 +168,19 @@ pub(super) struct Bounds {
     pub radius_squared: f32,
     /// The thinnest line's; ∞ if there is no line.
     pub thinnest_squared: f32,
+    /// Whose style the lines have.
+    pub stylist: Stylist,
+}
+
+/// The style of the lines of a set of nodes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Stylist {
+    /// There are no lines.
+    None,
+    /// All have that of this row.
+    Alike(u32),
+    /// They have several.
+    Many,
 }
 
 impl Bounds {
@@ -187,25 +192,11 @@ impl Bounds {
         lowest: Rank::FIRST,
         radius_squared: 0.0,
         thinnest_squared: f32::INFINITY,
+        stylist: Stylist::None,
     };
 
-    /// The bounds of one node.
     #[inline]
-    pub(super) fn of_node(features: &Features, rank: Rank, radius_squared: f32) -> Self {
-        let draws = radius_squared > 0.0;
-        Self {
-            object: [features.object; 2],
-            shader: [features.shader; 2],
-            best: if draws { rank } else { Rank::LAST },
-            highest: rank,
-            lowest: rank,
-            radius_squared,
-            thinnest_squared: if draws { radius_squared } else { f32::INFINITY },
-        }
-    }
-
-    #[inline]
-    fn union(&self, other: &Self) -> Self {
+    fn union(&self, other: &Self, nodes: &NodeColumns) -> Self {
         let range = |a: [u32; 2], b: [u32; 2]| [a[0].min(b[0]), a[1].max(b[1])];
         Self {
             object: range(self.object, other.object),
@@ -215,6 +206,13 @@ impl Bounds {
             lowest: self.lowest.worse(other.lowest),
             radius_squared: self.radius_squared.max(other.radius_squared),
             thinnest_squared: self.thinnest_squared.min(other.thinnest_squared),
+            stylist: match (self.stylist, other.stylist) {
+                (Stylist::None, one) | (one, Stylist::None) => one,
+                (Stylist::Alike(a), Stylist::Alike(b)) if style(nodes, a as usize) == style(nodes, b as usize) => {
+                    Stylist::Alike(a)
+                }
+                _ => Stylist::Many,
+            },
         }
     }
 }
@@ -244,26 +242,6 @@ impl Bounded<'_> {
         (tests.object && apart(self.bounds.object, other.bounds.object))
             || (tests.shader && apart(self.bounds.shader, other.bounds.shader))
             || (tests.reads_shapes && all_hits && self.shape.must_differ(other.shape, tests))
-    }
-}
-
-/// The bounds of one node, to be compared with those of many.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct NodeBounds {
-    bounds: Bounds,
-    shape: Shape,
-}
-
-impl NodeBounds {
-    #[inline]
-    pub(super) fn new(features: &Features, rank: Rank, radius_squared: f32) -> Self {
-        let shape = if features.is_miss() { Shape::EMPTY } else { Shape::of_node(features) };
-        Self { bounds: Bounds::of_node(features, rank, radius_squared), shape }
-    }
-
-    #[inline]
-    pub(super) fn get(&self) -> Bounded<'_> {
-        Bounded { bounds: &self.bounds, shape: &self.shape }
     }
 }
 
@@ -361,12 +339,12 @@ impl PathBounds {
         if pixels.is_empty() {
             return;
         }
-        let bounds = pixels.iter().fold(Bounds::EMPTY, |all, pixel| all.union(&pixel.bounds));
+        let bounds = pixels.iter().fold(Bounds::EMPTY, |all, pixel| all.union(&pixel.bounds, nodes));
         let shape = self.shapes.get(first..).unwrap_or_default().iter().fold(Shape::EMPTY, |all, one| all.union(one));
         let start = self.by_rank.len();
         self.by_rank.extend((0..).take(pixels.len()).map(|index: u8| index));
         self.by_rank[start..].sort_unstable_by_key(|&index| (pixels[usize::from(index)].bounds.best, index));
-        self.bounds = self.bounds.union(&bounds);
+        self.bounds = self.bounds.union(&bounds, nodes);
         self.shape = self.shape.union(&shape);
         self.blocks.push(Block { rect, bounds, shape, first: first as u32, end: self.pixels.len() as u32 });
     }
@@ -413,7 +391,20 @@ impl PathBounds {
                 }
             }
         }
+        bounds.stylist = self.stylist(nodes, first, end);
         bounds
+    }
+
+    fn stylist(&self, nodes: &NodeColumns, first: usize, end: usize) -> Stylist {
+        let Some(row) = (first..end).find(|row| self.radius_squared.get(*row) > 0.0) else { return Stylist::None };
+        let alike = match (&nodes.line_color, &nodes.line_width) {
+            (Column::Constant(_), Column::Constant(_)) => true,
+            _ => {
+                let own = style(nodes, row);
+                (row + 1..end).all(|row| self.radius_squared.get(row) <= 0.0 || style(nodes, row) == own)
+            }
+        };
+        if alike { Stylist::Alike(row as u32) } else { Stylist::Many }
     }
 
     pub(super) fn bounded(&self) -> Bounded<'_> {

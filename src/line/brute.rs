@@ -57,7 +57,8 @@ fn seen(
                     continue;
                 }
                 // Of all valid pairs the seen one minimises −priority_p, depth_p, |x_t − x_n|, index of n.
-                let pair = Pair { rank: p.rank, distance_squared, pixel, tile: segment.index as u32, row: row as u32, own };
+                let pair =
+                    Pair { rank: p.rank, distance_squared, pixel, tile: segment.index as u32, row: row as u32, own };
                 if seen.is_none_or(|best| pair.beats(&best)) {
                     seen = Some(pair);
                 }

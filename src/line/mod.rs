@@ -6,11 +6,13 @@
 //! size, threads and method change no bit.
 //!
 //! `brute` is the definition as plain loops and the oracle for `search`, which gives the same bits much sooner. What
-//! decides is shared by both: `differ`, `pair`, [`Rules`].
+//! decides is shared by both: `differ`, `pair`, [`Rules`]. `bounds` and `lanes` are the search's: what is known of many nodes
+//! at once, and the loops over neighbours that are left.
 
 mod bounds;
 mod brute;
 mod differ;
+mod lanes;
 mod pair;
 mod rules;
 mod search;
@@ -52,7 +54,8 @@ pub enum LineType {
     Feature,
 }
 
-/// The line that a sample sees.
+/// The line that a sample sees. With [`Rules::with_any_pair`], `fired`, `neighbor` and `own` may be those of another pair
+/// that looks the same.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SeenLine {
     /// The line's colour, tinted if the rules say so.

@@ -28,6 +28,18 @@ impl Rank {
         Self((priority as u64) << 32 | depth as u64)
     }
 
+    /// The priority as bits: fewer outrank more.
+    #[inline(always)]
+    pub(super) fn priority_bits(self) -> u32 {
+        (self.0 >> 32) as u32
+    }
+
+    /// The depth as bits: fewer outrank more.
+    #[inline(always)]
+    pub(super) fn depth_bits(self) -> u32 {
+        self.0 as u32
+    }
+
     #[inline(always)]
     pub(super) fn outranks(self, other: Self) -> bool {
         self.0 < other.0

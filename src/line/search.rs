@@ -14,12 +14,16 @@
 //!    the last pixel's answer, or the far side of a pixel that surely differs. Only pixels nearer than that are looked at.
 //! 4. Each target goes through what remains, best first, until what it has found cannot be beaten.
 
-use super::bounds::{Block, Bounded, NodeBounds, PathBounds, PixelNodes};
+use super::bounds::{Block, Bounded, PathBounds, PixelNodes, Stylist};
 use super::differ::Tests;
+use super::lanes::{Lanes, Origin};
 use super::pair::{Found, LineNode, Pair, Rank, distance_squared};
-use super::window::{PathTile, PathWindow};
+use super::window::{LineStyle, PathTile, PathWindow};
 use super::{LineCounts, Rules};
 use crate::sample::PixelRect;
+
+/// How many neighbours are gathered before the targets are tested with them; each further batch is four times as large.
+const FIRST_BATCH: usize = 128;
 
 /// The line that each target sees which is not yet `lined`, in no particular order.
 pub(super) fn find(
@@ -32,10 +36,13 @@ pub(super) fn find(
     let mut search = Search {
         window,
         tests: rules.tests(),
+        any_pair: !rules.exact_pairs(),
         tiles: Vec::new(),
         near_block: Vec::new(),
         near_pixel: Vec::new(),
         candidates: Vec::new(),
+        certain: false,
+        lanes: Lanes::new(),
         targets: Vec::new(),
         last_other: None,
         last_own: None,
@@ -77,19 +84,18 @@ struct Near<'w> {
 struct Candidate<'w> {
     /// Place of its tile in the window.
     tile: u32,
-    /// Its place in the tile.
-    place: u32,
-    bounds: &'w PathBounds,
     pixel: &'w PixelNodes,
     /// Smallest squared distance from the pixel of targets.
     gap_squared: f32,
+    /// Whether all its nodes surely differ from all targets.
+    certain: bool,
 }
 
 /// A target with the best pair found so far.
 struct Target {
     row: usize,
     node: LineNode,
-    bounds: NodeBounds,
+    style: LineStyle,
     best: Option<Pair>,
 }
 
@@ -98,12 +104,6 @@ impl Target {
     #[inline(always)]
     fn may_win(&self, rank: Rank) -> bool {
         rank.outranks(self.node.rank) && self.best.is_none_or(|best| !best.rank.outranks(rank))
-    }
-
-    /// Whether neighbours of at most this rank and at least this distance can only tie in rank and are too far then.
-    #[inline(always)]
-    fn loses_by_distance(&self, rank: Rank, distance_squared: f32) -> bool {
-        self.best.is_some_and(|best| best.rank == rank && distance_squared > best.distance_squared)
     }
 
     /// Whether the target has no better line than its own, if it draws one.
@@ -125,6 +125,8 @@ impl Target {
 struct Search<'w, 'a> {
     window: &'w PathWindow<'a>,
     tests: &'w Tests,
+    /// Whether any pair will do that looks like the one that is seen.
+    any_pair: bool,
     /// Tiles that may hold neighbours of the tile of targets.
     tiles: Vec<(u32, &'w PathTile<'a>)>,
     /// Blocks that may hold neighbours of the current block of targets.
@@ -133,6 +135,10 @@ struct Search<'w, 'a> {
     near_pixel: Vec<Near<'w>>,
     /// Pixels of those blocks that may hold what is searched.
     candidates: Vec<Candidate<'w>>,
+    /// Whether all their nodes surely differ from all targets.
+    certain: bool,
+    /// Nodes of the candidates.
+    lanes: Lanes,
     /// The targets of the current pixel.
     targets: Vec<Target>,
     /// The last line of a neighbour that was found: likely the next one, too.
@@ -186,8 +192,7 @@ impl<'w> Search<'w, '_> {
                 continue;
             }
             let node = nodes.node(pixel.pixel, row);
-            let bounds = NodeBounds::new(&node.features, node.rank, node.radius_squared);
-            self.targets.push(Target { row, node, bounds, best: None });
+            self.targets.push(Target { row, node, style: nodes.style(row), best: None });
         }
         self.search_others(pixel.pixel, &bounded);
         self.search_own(pixel.pixel, &bounded);
@@ -196,46 +201,102 @@ impl<'w> Search<'w, '_> {
     /// Finds for each target the highest-ranking valid pair whose neighbour outranks it.
     fn search_others(&mut self, pixel: [i32; 2], bounded: &Bounded<'_>) {
         let mut targets = std::mem::take(&mut self.targets);
-        let mut floor = Rank::FIRST;
         for target in &mut targets {
             if let Some(pair) = self.last_other {
                 self.test_again(target, &pair);
             }
-            floor = floor.worse(target.best.map_or(target.node.rank, |best| best.rank));
+            if let Some(pair) = self.last_own.filter(|_| self.any_pair) {
+                self.test_again(target, &pair);
+            }
         }
-        self.collect_others(pixel, bounded, floor);
-        for target in &mut targets {
-            for i in 0..self.candidates.len() {
-                let candidate = self.candidates[i];
-                let bounds = &candidate.pixel.bounds;
-                // Sorted by rank: no later pixel can win either.
-                if !target.may_win(bounds.best) {
-                    break;
+        let near = self.near_pixel.iter().map(|near| (near.tile, near.block.bounds.stylist));
+        let style = self.common_style(near);
+        let floor = self.floor(&targets, style);
+        if floor > Rank::FIRST {
+            self.collect_others(pixel, bounded, floor);
+            self.search_candidates(pixel, &mut targets, floor);
+        }
+        self.last_other =
+            targets.iter().rev().filter_map(|target| target.best).find(|best| !best.own).or(self.last_other);
+        self.targets = targets;
+    }
+
+    /// The style of all lines of some sets of nodes, if it is the same and nothing else of a pair matters.
+    fn common_style(&self, mut stylists: impl Iterator<Item = (u32, Stylist)>) -> Option<LineStyle> {
+        if !self.any_pair {
+            return None;
+        }
+        let mut common = None;
+        stylists
+            .all(|(tile, stylist)| match stylist {
+                Stylist::None => true,
+                Stylist::Many => false,
+                Stylist::Alike(row) => {
+                    let style = self.window.tiles[tile as usize].as_ref().map(|nodes| nodes.style(row as usize));
+                    style == *common.get_or_insert(style)
                 }
-                let gap_squared = target_gap_squared(&target.node, candidate.pixel.pixel);
-                if gap_squared >= bounds.radius_squared
-                    || target.loses_by_distance(bounds.best, gap_squared)
-                    || !target.bounds.get().may_differ(&candidate.bounds.of_pixel(candidate.place as usize), self.tests)
-                {
-                    continue;
-                }
-                let Some(nodes) = &self.window.tiles[candidate.tile as usize] else { continue };
-                let pixel = candidate.pixel;
-                self.pairs_tested += u64::from(pixel.end - pixel.first);
-                for row in pixel.first..pixel.end {
-                    if target.may_win(nodes.rank(row as usize))
-                        && distance_squared(&target.node, pixel.pixel, nodes.offset(row as usize))
-                            < bounds.radius_squared
-                    {
-                        self.test(target, candidate.tile, pixel.pixel, row);
+            })
+            .then_some(common?)?
+    }
+
+    /// The lowest rank that can still change how a target looks, if all lines that can have this style; below all if
+    /// nothing can.
+    fn floor(&self, targets: &[Target], style: Option<LineStyle>) -> Rank {
+        let unsettled = targets.iter().filter(|target| !self.is_settled(target, style));
+        unsettled.fold(Rank::FIRST, |floor, target| floor.worse(target.best.map_or(target.node.rank, |best| best.rank)))
+    }
+
+    /// Whether no line of this style can change how a target looks.
+    fn is_settled(&self, target: &Target, style: Option<LineStyle>) -> bool {
+        let Some((style, best)) = style.zip(target.best) else { return false };
+        if best.own {
+            return target.style == style;
+        }
+        self.window.tiles[best.tile as usize].as_ref().is_some_and(|nodes| nodes.style(best.row as usize) == style)
+    }
+
+    /// Goes through the candidates, the highest-ranking first.
+    fn search_candidates(&mut self, pixel: [i32; 2], targets: &mut [Target], mut floor: Rank) {
+        let style = self.common_style(self.candidates.iter().map(|c| (c.tile, c.pixel.bounds.stylist)));
+        floor = floor.better(self.floor(targets, style));
+        let (mut next, mut batch) = (0, FIRST_BATCH);
+        while let Some(first) = self.candidates.get(next).map(|candidate| candidate.pixel.bounds.best) {
+            if floor.outranks(first) {
+                break;
+            }
+            self.lanes.clear();
+            self.lanes.certain = self.certain;
+            while let Some(candidate) = self.candidates.get(next).copied()
+                && self.lanes.len() < batch
+            {
+                self.gather(pixel, &candidate, |rank, radius_squared| radius_squared > 0.0 && !floor.outranks(rank));
+                next += 1;
+            }
+            batch *= 4;
+            self.lanes.finish();
+            for target in targets.iter_mut() {
+                if target.may_win(first) && !self.is_settled(target, style) {
+                    self.pairs_tested += self.lanes.len() as u64;
+                    let score = self.lanes.score_others(&target.node, self.tests);
+                    for origin in self.lanes.with_score(score) {
+                        keep(self.window, self.tests, target, origin);
                     }
                 }
             }
-            if target.best.is_some_and(|best| !best.own) {
-                self.last_other = target.best;
+            floor = self.floor(targets, style);
+        }
+    }
+
+    /// Gathers the rows of a candidate for targets in `pixel`.
+    fn gather(&mut self, pixel: [i32; 2], candidate: &Candidate<'w>, wanted: impl Fn(Rank, f32) -> bool) {
+        let Candidate { tile, pixel: neighbors, .. } = *candidate;
+        let Some(nodes) = &self.window.tiles[tile as usize] else { return };
+        for row in neighbors.first..neighbors.end {
+            let rank = nodes.rank(row as usize);
+            if wanted(rank, nodes.bounds.radius_squared.get(row as usize)) {
+                self.lanes.push(Origin { tile, pixel: neighbors.pixel, row }, pixel, rank, nodes, self.tests);
             }
         }
-        self.targets = targets;
     }
 
     /// Collects pixels that may hold a neighbour whose line a target sees, by best rank. None lies below `floor`, the
@@ -265,16 +326,18 @@ impl<'w> Search<'w, '_> {
                 if !targets.may_differ(&bounded, self.tests) {
                     continue;
                 }
-                self.candidates.push(Candidate { tile, place, bounds, pixel: neighbors, gap_squared });
-                if neighbors.bounds.best.outranks(targets.bounds.highest)
+                let certain = targets.must_differ(&bounded, self.tests);
+                self.candidates.push(Candidate { tile, pixel: neighbors, gap_squared, certain });
+                if certain
+                    && neighbors.bounds.best.outranks(targets.bounds.highest)
                     && far_squared(pixel, neighbors.pixel) < neighbors.bounds.thinnest_squared
-                    && targets.must_differ(&bounded, self.tests)
                 {
                     floor = floor.better(neighbors.bounds.best);
                 }
             }
         }
         self.candidates.retain(|candidate| !floor.outranks(candidate.pixel.bounds.best));
+        self.certain = self.candidates.iter().all(|candidate| candidate.certain);
         self.candidates.sort_unstable_by(|a, b| {
             let by_rank = a.pixel.bounds.best.cmp(&b.pixel.bounds.best);
             by_rank.then(a.gap_squared.total_cmp(&b.gap_squared))
@@ -285,9 +348,15 @@ impl<'w> Search<'w, '_> {
     fn search_own(&mut self, pixel: [i32; 2], bounded: &Bounded<'_>) {
         let mut targets = std::mem::take(&mut self.targets);
         let mut own = OwnTargets { highest: Rank::LAST, lowest: Rank::FIRST, thinnest: f32::INFINITY, limit: 0.0 };
-        for target in targets.iter_mut().filter(|target| target.wants_own()) {
+        let any_pair = self.any_pair;
+        // An own line looks the same whichever its neighbour is.
+        let open = |target: &&mut Target| target.wants_own() && !(any_pair && target.best.is_some());
+        for target in targets.iter_mut().filter(open) {
             if let Some(pair) = self.last_own {
                 self.test_again(target, &pair);
+            }
+            if !open(&target) {
+                continue;
             }
             // The last own line may be another's here.
             let radius_squared = target.node.radius_squared;
@@ -299,12 +368,38 @@ impl<'w> Search<'w, '_> {
         }
         if own.limit > 0.0 || own.thinnest < f32::INFINITY {
             self.collect_own(pixel, bounded, own);
-            for target in targets.iter_mut().filter(|target| target.wants_own()) {
-                self.search_nearest(target);
-                if target.best.is_some_and(|best| best.own) {
-                    self.last_own = target.best;
+            let (mut next, mut batch) = (0, FIRST_BATCH);
+            while let Some(first) = self.candidates.get(next).map(|candidate| candidate.gap_squared) {
+                if first > own.limit {
+                    break;
+                }
+                self.lanes.clear();
+                self.lanes.certain = self.certain;
+                while let Some(candidate) = self.candidates.get(next).copied()
+                    && self.lanes.len() < batch
+                {
+                    self.gather(pixel, &candidate, |rank, _| !rank.outranks(own.highest));
+                    next += 1;
+                }
+                batch *= 4;
+                self.lanes.finish();
+                own.limit = 0.0;
+                for target in targets.iter_mut().filter(open) {
+                    if !target.too_far(first) {
+                        self.pairs_tested += self.lanes.len() as u64;
+                        let score = self.lanes.score_own(&target.node, self.tests);
+                        for origin in self.lanes.with_score(score) {
+                            keep(self.window, self.tests, target, origin);
+                        }
+                    }
+                    if open(&target) {
+                        let limit = target.best.map_or(target.node.radius_squared, |best| best.distance_squared);
+                        own.limit = own.limit.max(limit);
+                    }
                 }
             }
+            self.last_own =
+                targets.iter().rev().filter_map(|target| target.best).find(|best| best.own).or(self.last_own);
         }
         self.targets = targets;
     }
@@ -331,71 +426,44 @@ impl<'w> Search<'w, '_> {
                 if !targets.may_differ(&bounded, self.tests) {
                     continue;
                 }
-                self.candidates.push(Candidate { tile, place, bounds, pixel: neighbors, gap_squared });
+                let certain = targets.must_differ(&bounded, self.tests);
+                self.candidates.push(Candidate { tile, pixel: neighbors, gap_squared, certain });
                 let far_squared = far_squared(pixel, neighbors.pixel);
-                if far_squared < own.limit.min(own.thinnest)
-                    && !neighbors.bounds.lowest.outranks(own.lowest)
-                    && targets.must_differ(&bounded, self.tests)
+                if certain && far_squared < own.limit.min(own.thinnest) && !neighbors.bounds.lowest.outranks(own.lowest)
                 {
                     own.limit = far_squared;
                 }
             }
         }
         self.candidates.retain(|candidate| candidate.gap_squared <= own.limit);
+        self.certain = self.candidates.iter().all(|candidate| candidate.certain);
         self.candidates.sort_unstable_by(|a, b| a.gap_squared.total_cmp(&b.gap_squared));
-    }
-
-    fn search_nearest(&mut self, target: &mut Target) {
-        if let Some(pair) = self.last_own {
-            self.test_again(target, &pair);
-        }
-        for i in 0..self.candidates.len() {
-            let candidate = self.candidates[i];
-            if target.too_far(candidate.gap_squared) {
-                break;
-            }
-            let pixel = candidate.pixel;
-            if target.too_far(target_gap_squared(&target.node, pixel.pixel))
-                || pixel.bounds.lowest.outranks(target.node.rank)
-                || !target.bounds.get().may_differ(&candidate.bounds.of_pixel(candidate.place as usize), self.tests)
-            {
-                continue;
-            }
-            let Some(nodes) = &self.window.tiles[candidate.tile as usize] else { continue };
-            self.pairs_tested += u64::from(pixel.end - pixel.first);
-            for row in pixel.first..pixel.end {
-                if !target.too_far(distance_squared(&target.node, pixel.pixel, nodes.offset(row as usize))) {
-                    self.test(target, candidate.tile, pixel.pixel, row);
-                }
-            }
-        }
     }
 
     /// Tests a target with the neighbour of another target's pair.
     fn test_again(&mut self, target: &mut Target, pair: &Pair) {
         self.pairs_tested += 1;
-        self.test(target, pair.tile, pair.pixel, pair.row);
+        let origin = Origin { tile: pair.tile, pixel: pair.pixel, row: pair.row };
+        keep(self.window, self.tests, target, &origin);
     }
+}
 
-    /// Keeps a pair if it is valid and beats the best.
-    #[inline]
-    fn test(&self, target: &mut Target, tile: u32, pixel: [i32; 2], row: u32) {
-        let Some(nodes) = &self.window.tiles[tile as usize] else { return };
-        let t = &target.node;
-        let rank = nodes.rank(row as usize);
-        let own = !rank.outranks(t.rank);
-        let distance_squared = distance_squared(t, pixel, nodes.offset(row as usize));
-        let (rank, radius_squared) =
-            if own { (t.rank, t.radius_squared) } else { (rank, nodes.bounds.radius_squared.get(row as usize)) };
-        if distance_squared >= radius_squared {
-            return;
-        }
-        let pair = Pair { rank, distance_squared, pixel, tile, row, own };
-        if target.best.is_none_or(|best| pair.beats(&best))
-            && self.tests.differ(&t.features, &nodes.features(row as usize))
-        {
-            target.best = Some(pair);
-        }
+/// Keeps a pair if it is valid and beats the best.
+fn keep(window: &PathWindow<'_>, tests: &Tests, target: &mut Target, origin: &Origin) {
+    let Origin { tile, pixel, row } = *origin;
+    let Some(nodes) = &window.tiles[tile as usize] else { return };
+    let t = &target.node;
+    let rank = nodes.rank(row as usize);
+    let own = !rank.outranks(t.rank);
+    let distance_squared = distance_squared(t, pixel, nodes.offset(row as usize));
+    let (rank, radius_squared) =
+        if own { (t.rank, t.radius_squared) } else { (rank, nodes.bounds.radius_squared.get(row as usize)) };
+    if distance_squared >= radius_squared {
+        return;
+    }
+    let pair = Pair { rank, distance_squared, pixel, tile, row, own };
+    if target.best.is_none_or(|best| pair.beats(&best)) && tests.differ(&t.features, &nodes.features(row as usize)) {
+        target.best = Some(pair);
     }
 }
 
@@ -440,20 +508,6 @@ fn pixel_gap_squared(targets: [i32; 2], neighbors: [i32; 2]) -> f32 {
 fn far_squared(targets: [i32; 2], neighbors: [i32; 2]) -> f32 {
     let far = |axis: usize| ((neighbors[axis] - targets[axis]).abs() + 1) as f32;
     let (x, y) = (far(0), far(1));
-    x * x + y * y
-}
-
-/// The smallest squared distance that [`distance_squared`] can give from a target to a neighbour in a pixel. Its
-/// operations are the same, at the nearest offset there is; they are monotone, so no rounding makes this too large.
-#[inline(always)]
-fn target_gap_squared(t: &LineNode, pixel: [i32; 2]) -> f32 {
-    let gap = |axis: usize| {
-        let difference = (pixel[axis] - t.pixel[axis]) as f32;
-        let before = difference + (0.0 - t.offset[axis]);
-        let behind = difference + (1.0 - t.offset[axis]);
-        before.max(-behind).max(0.0)
-    };
-    let (x, y) = (gap(0), gap(1));
     x * x + y * y
 }
 

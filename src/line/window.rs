@@ -142,9 +142,27 @@ impl<'a> PathTile<'a> {
     }
 
     #[inline(always)]
+    pub(super) fn style(&self, row: usize) -> LineStyle {
+        style(self.nodes, row)
+    }
+
+    #[inline(always)]
     pub(super) fn features(&self, row: usize) -> Features {
         features(self.nodes, row)
     }
+}
+
+/// What of a node a line shows: colour and width.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct LineStyle {
+    color: [f32; 3],
+    width: f32,
+}
+
+/// The style of a row.
+#[inline(always)]
+pub(super) fn style(nodes: &NodeColumns, row: usize) -> LineStyle {
+    LineStyle { color: nodes.line_color.get(row), width: nodes.line_width.get(row) }
 }
 
 /// The feature attributes of a row.
