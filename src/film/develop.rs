@@ -15,7 +15,7 @@ use super::layer::{FilmTile, Layer};
 use super::spread::{Spread, Sums};
 use crate::line::{LineBuffer, LineType, SeenLine};
 use crate::math::{Vec3, Vec4};
-use crate::sample::{PixelRect, SampleBuffer, SampleColor};
+use crate::sample::{PixelRect, SampleBuffer};
 
 /// Tiles of samples with their lines, in a grid as in [`crate::line::Window`].
 #[derive(Clone, Debug)]
@@ -236,12 +236,13 @@ impl Field {
     /// Puts the values of a pixel's samples into `values`, unless they are zero.
     fn gather(self, pixel: &SourcePixel<'_>, values: &mut Vec<Vec4>) -> Gathered {
         let samples = pixel.first..pixel.end;
-        let plain = |color: &SampleColor| Vec3::from(color.color).extend(color.alpha);
+        let buffer = pixel.buffer;
+        let plain = |sample: usize| Vec3::from(buffer.color[sample]).extend(buffer.alpha.get(sample));
         let lined = || pixel.lined.iter().map(|&sample| sample as usize - pixel.first).zip(pixel.lines);
         match self {
             Self::Plain | Self::Lined => {
                 values.clear();
-                values.extend(pixel.buffer.color[samples].iter().map(plain));
+                values.extend(samples.map(plain));
                 if self == Self::Plain || pixel.lines.is_empty() {
                     return Gathered::Plain;
                 }

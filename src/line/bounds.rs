@@ -323,7 +323,7 @@ impl PathBounds {
         let first = self.pixels.len();
         for y in rect.y0..rect.y1 {
             for pixel in (rect.x0..rect.x1).map(|x| [x, y]) {
-                let rows = nodes.rows(buffer.pixel_number(pixel));
+                let rows = nodes.rows.of_pixel(buffer.pixel_number(pixel));
                 if rows.is_empty() {
                     continue;
                 }
@@ -371,8 +371,8 @@ impl PathBounds {
         let (mut narrow, mut wide) = (f32::INFINITY, 0.0_f32);
         match &self.radius_squared {
             Column::Constant(radius) => (narrow, wide) = (*radius, *radius),
-            Column::Values(radii) => {
-                for &radius in &radii[first..end] {
+            radii => {
+                for radius in (first..end).map(|row| radii.get(row)) {
                     narrow = narrow.min(radius);
                     wide = wide.max(radius);
                 }
@@ -422,9 +422,9 @@ impl PathBounds {
 fn range(ids: &Column<u32>, first: usize, end: usize) -> [u32; 2] {
     match ids {
         Column::Constant(id) => [*id; 2],
-        Column::Values(ids) => {
+        ids => {
             let (mut low, mut high) = (u32::MAX, 0);
-            for &id in &ids[first..end] {
+            for id in (first..end).map(|row| ids.get(row)) {
                 low = low.min(id);
                 high = high.max(id);
             }
@@ -465,18 +465,11 @@ fn extent<const N: usize>(
 
 /// The squared radius of each row's line. Widths mostly come in runs.
 fn radii_squared(widths: &Column<f32>, rules: &Rules) -> Column<f32> {
-    let squared = |width: f32| rules.radius(width) * rules.radius(width);
-    match widths {
-        Column::Constant(width) => Column::Constant(squared(*width)),
-        Column::Values(widths) => {
-            let mut last = (0.0, squared(0.0));
-            let of = |&width: &f32| {
-                if width != last.0 {
-                    last = (width, squared(width));
-                }
-                last.1
-            };
-            Column::Values(widths.iter().map(of).collect())
+    let mut last = (0.0, 0.0);
+    widths.map(|width| {
+        if width != last.0 {
+            last = (width, rules.radius(width) * rules.radius(width));
         }
-    }
+        last.1
+    })
 }

@@ -14,8 +14,8 @@ pub(super) fn find(
     counts: &mut LineCounts,
 ) -> Vec<Found> {
     let mut found = Vec::new();
-    for (row, &sample) in targets.nodes.sample.iter().enumerate() {
-        if lined[sample as usize] {
+    for row in 0..targets.nodes.rows.len() {
+        if lined[targets.nodes.rows.sample(row) as usize] {
             continue;
         }
         let pair = seen(window, targets, row, rules, counts);
@@ -32,7 +32,7 @@ fn seen(
     rules: &Rules,
     counts: &mut LineCounts,
 ) -> Option<Pair> {
-    let [x, y] = targets.buffer.pixel_of(targets.nodes.sample[row]);
+    let [x, y] = targets.buffer.pixel_of(targets.nodes.rows.sample(row));
     let t = targets.node([x, y], row);
     let mut seen: Option<Pair> = None;
 
@@ -40,7 +40,7 @@ fn seen(
     for segment in window.segments(PixelRect { x0: x, y0: y, x1: x + 1, y1: y + 1 }.grown(rules.reach())) {
         let tile = segment.tile;
         for pixel in (segment.x0..segment.x1).map(|x| [x, segment.y]) {
-            for row in tile.nodes.rows(tile.buffer.pixel_number(pixel)) {
+            for row in tile.nodes.rows.of_pixel(tile.buffer.pixel_number(pixel)) {
                 let n = tile.node(pixel, row);
                 counts.pairs_tested += 1;
 

@@ -121,7 +121,7 @@ pub fn find_lines(window: &Window<'_>, target: LineTile<'_>, rules: &Rules, meth
             Method::Brute => brute::find(&window, &targets, &lined, rules, &mut counts),
         };
         for found in found {
-            let sample = nodes.sample[found.row];
+            let sample = nodes.rows.sample(found.row);
             if let Some(line) = style::style(&window, &targets, &found, rules) {
                 lined[sample as usize] = true;
                 lines.push((sample, line));

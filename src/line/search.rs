@@ -188,7 +188,7 @@ impl<'w> Search<'w, '_> {
             return;
         }
         for row in pixel.first as usize..pixel.end as usize {
-            if lined[nodes.nodes.sample[row] as usize] {
+            if lined[nodes.nodes.rows.sample(row) as usize] {
                 continue;
             }
             let node = nodes.node(pixel.pixel, row);

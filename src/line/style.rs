@@ -32,8 +32,8 @@ pub(super) fn style(window: &PathWindow<'_>, targets: &PathTile<'_>, found: &Fou
     let line_color = Vec3::from(styling.line_color.get(row));
     let alpha = rules.alpha(styling.line_width.get(row));
 
-    let sample = targets.nodes.sample[found.row];
-    let before = Vec3::from(targets.buffer.color[sample as usize].color);
+    let sample = targets.nodes.rows.sample(found.row);
+    let before = Vec3::from(targets.buffer.color[sample as usize]);
     // The target's: it is the target's colour that the line replaces.
     let throughput = Vec3::from(targets.nodes.throughput.get(found.row));
     let settings = rules.settings();
@@ -53,7 +53,7 @@ pub(super) fn style(window: &PathWindow<'_>, targets: &PathTile<'_>, found: &Fou
         lined: lined.to_array(),
         path: found.path,
         fired: rules.tests().fired(&features(targets.nodes, found.row), &features(neighbors.nodes, pair.row as usize)),
-        neighbor: (pair.pixel, neighbors.nodes.sample[pair.row as usize] % spp),
+        neighbor: (pair.pixel, neighbors.nodes.rows.sample(pair.row as usize) % spp),
         own: pair.own,
     })
 }

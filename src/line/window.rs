@@ -133,7 +133,7 @@ impl<'a> PathTile<'a> {
     /// Place of a row's sample in its pixel.
     #[inline(always)]
     pub(super) fn offset(&self, row: usize) -> [f32; 2] {
-        self.buffer.offset[self.nodes.sample[row] as usize]
+        self.buffer.offset[self.nodes.rows.sample(row) as usize]
     }
 
     #[inline(always)]
