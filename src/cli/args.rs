@@ -113,7 +113,8 @@ pub struct SceneArguments {
     /// an .exr holds exactly these [default: rgba; all but line.TYPE].
     #[arg(long, value_name = "NAME")]
     pub layer: Vec<String>,
-    /// How lines are found: `exact` is fast, `brute` tries every pair and gives the same picture.
+    /// How lines are found: `exact` is fast, `brute` tries every pair and gives the same picture; `choudhury` (2009) and
+    /// `bauer` (2017) are older methods, to compare with.
     #[arg(long, value_name = "HOW", default_value = "exact")]
     pub lines: LineMode,
     /// Says nothing but errors.
@@ -149,11 +150,18 @@ pub enum LineMode {
     Off,
     Exact,
     Brute,
+    Choudhury,
+    Bauer,
 }
 
 impl LineMode {
     pub fn method(self) -> Method {
-        if self == Self::Brute { Method::Brute } else { Method::Exact }
+        match self {
+            Self::Off | Self::Exact => Method::Exact,
+            Self::Brute => Method::Brute,
+            Self::Choudhury => Method::Choudhury,
+            Self::Bauer => Method::Bauer,
+        }
     }
 }
 

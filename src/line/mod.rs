@@ -9,6 +9,7 @@
 //! decides is shared by both: `differ`, `pair`, [`Rules`]. `bounds` and `lanes` are the search's: what is known of many nodes
 //! at once, and the loops over neighbours that are left.
 
+mod baselines;
 mod bounds;
 mod brute;
 mod differ;
@@ -25,9 +26,10 @@ pub use rules::Rules;
 pub use window::{LineTile, Window};
 
 use crate::sample::{NodePath, PixelRect};
+use pair::LineNode;
 use window::PathTile;
 
-/// How lines are searched. Both give the same lines, bit for bit.
+/// How lines are searched. The first two give the same lines, bit for bit; the others are methods to compare with.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Method {
     /// Bounds and cut-offs.
@@ -35,6 +37,10 @@ pub enum Method {
     Exact,
     /// Every neighbour of every sample.
     Brute,
+    /// Choudhury and Parker 2009: one style, opacity by the part of the stencil that differs; camera nodes only.
+    Choudhury,
+    /// Bauer 2017: one style, a contour image of sub-pixels; camera nodes only.
+    Bauer,
 }
 
 /// What kind of feature a line marks (DESIGN section 3.6), by the strongest reason, in this order.
@@ -119,6 +125,14 @@ pub fn find_lines(window: &Window<'_>, target: LineTile<'_>, rules: &Rules, meth
         let found = match method {
             Method::Exact => search::find(&window, &targets, &lined, rules, &mut counts),
             Method::Brute => brute::find(&window, &targets, &lined, rules, &mut counts),
+            Method::Choudhury => {
+                lines = baselines::choudhury(&window, &targets, rules, &mut counts);
+                break;
+            }
+            Method::Bauer => {
+                lines = baselines::bauer(&window, &targets, rules, &mut counts);
+                break;
+            }
         };
         for found in found {
             let sample = nodes.rows.sample(found.row);

@@ -61,6 +61,11 @@ impl Rules {
         &self.settings
     }
 
+    /// Widths above this count as this.
+    pub(super) fn widest(&self) -> f32 {
+        self.widest
+    }
+
     pub(super) fn tests(&self) -> &Tests {
         &self.tests
     }
