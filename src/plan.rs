@@ -85,7 +85,7 @@ impl Plan {
     #[must_use]
     pub fn new(scene: &Scene, shaders: &Shaders, layers: &[Layer]) -> Self {
         let settings = scene.render();
-        let color = layers.iter().any(|layer| matches!(layer, Layer::Rgba | Layer::Color));
+        let color = layers.iter().any(|layer| matches!(layer, Layer::Rgba | Layer::Color | Layer::Below));
         let used = used_materials(scene);
         let tests = scene.lines();
         let wants_feature = tests.feature.is_some() || layers.contains(&Layer::Feature);
@@ -220,7 +220,9 @@ fn plan_material(shader: &Shader, lights: bool, color: bool, used: bool) -> Mate
 
 fn plan_lines(scene: &Scene, shaders: &Shaders, layers: &[Layer], used: &[bool]) -> Option<LinePlan> {
     let settings = scene.lines();
-    let shown = layers.iter().any(|l| matches!(l, Layer::Rgba | Layer::Line | Layer::LineType(_)));
+    let shown = layers
+        .iter()
+        .any(|l| matches!(l, Layer::Rgba | Layer::Below | Layer::Line | Layer::LineType(_) | Layer::LinePath(_)));
     let tested = settings.object
         || settings.shader
         || settings.uv.is_some()

@@ -109,8 +109,8 @@ pub struct SceneArguments {
     /// Changes a value of the scene file, for example lines.width=3; may be given more than once.
     #[arg(long, value_name = "PATH=VALUE")]
     pub set: Vec<String>,
-    /// Writes this layer: rgba, color, line, line.TYPE, Z, N, P, uv, object, feature, aov_NAME. A .png shows the first;
-    /// an .exr holds exactly these [default: rgba; all but line.TYPE].
+    /// Writes this layer: rgba, color, line, line.TYPE, line.PATH, below, Z, N, P, uv, object, feature, aov_NAME. A .png
+    /// shows the first; an .exr holds exactly these [default: rgba; all but line.TYPE, line.PATH and below].
     #[arg(long, value_name = "NAME")]
     pub layer: Vec<String>,
     /// How lines are found: `exact` is fast, `brute` tries every pair and gives the same picture; `choudhury` (2009) and

@@ -94,7 +94,8 @@ pub(super) fn bauer(
     let contour = |at: [i32; 2]| {
         let own = last.get(&at)?;
         let beside = [[at[0] + 1, at[1]], [at[0], at[1] + 1]];
-        let fired = beside.iter().filter_map(|at| last.get(at)).map(|n| rules.tests().fired(&own.features, &n.features));
+        let fired =
+            beside.iter().filter_map(|at| last.get(at)).map(|n| rules.tests().fired(&own.features, &n.features));
         Some(fired.fold(Fired::empty(), |all, one| all | one)).filter(|fired| !fired.is_empty())
     };
 
@@ -129,12 +130,7 @@ fn node_of(targets: &PathTile<'_>, row: usize) -> LineNode {
 }
 
 /// Calls `visit` for every node within some pixels of a target.
-fn visit(
-    window: &PathWindow<'_>,
-    t: &LineNode,
-    radius: f32,
-    mut visit: impl FnMut(&LineNode, &PathTile<'_>, usize),
-) {
+fn visit(window: &PathWindow<'_>, t: &LineNode, radius: f32, mut visit: impl FnMut(&LineNode, &PathTile<'_>, usize)) {
     let [x, y] = t.pixel;
     let stencil = PixelRect { x0: x, y0: y, x1: x + 1, y1: y + 1 }.grown(radius.ceil() as i32);
     for segment in window.segments(stencil) {
