@@ -177,7 +177,7 @@ pub(super) struct Bounds {
 pub(super) enum Stylist {
     /// There are no lines.
     None,
-    /// All have that of this row.
+    /// All have that of this row and are opaque.
     Alike(u32),
     /// They have several.
     Many,
@@ -313,13 +313,14 @@ impl PathBounds {
         for y0 in (rect.y0..rect.y1).step_by(BLOCK as usize) {
             for x0 in (rect.x0..rect.x1).step_by(BLOCK as usize) {
                 let block = PixelRect { x0, y0, x1: x0 + BLOCK, y1: y0 + BLOCK }.intersection(&rect);
-                all.add_block(block, buffer, nodes, rules.tests());
+                all.add_block(block, buffer, nodes, rules);
             }
         }
         all
     }
 
-    fn add_block(&mut self, rect: PixelRect, buffer: &SampleBuffer, nodes: &NodeColumns, tests: &Tests) {
+    fn add_block(&mut self, rect: PixelRect, buffer: &SampleBuffer, nodes: &NodeColumns, rules: &Rules) {
+        let tests = rules.tests();
         let first = self.pixels.len();
         for y in rect.y0..rect.y1 {
             for pixel in (rect.x0..rect.x1).map(|x| [x, y]) {
@@ -329,7 +330,12 @@ impl PathBounds {
                 }
                 let (start, end) = (rows.start, rows.end);
                 let (first, last) = (start as u32, end as u32);
-                self.pixels.push(PixelNodes { pixel, first, end: last, bounds: self.of_rows(nodes, start, end) });
+                self.pixels.push(PixelNodes {
+                    pixel,
+                    first,
+                    end: last,
+                    bounds: self.of_rows(nodes, start, end, rules),
+                });
                 if tests.reads_shapes {
                     self.shapes.push(shape_of_rows(nodes, start, end, tests));
                 }
@@ -350,7 +356,7 @@ impl PathBounds {
     }
 
     /// Column by column: most are constant.
-    fn of_rows(&self, nodes: &NodeColumns, first: usize, end: usize) -> Bounds {
+    fn of_rows(&self, nodes: &NodeColumns, first: usize, end: usize, rules: &Rules) -> Bounds {
         let mut bounds = Bounds { object: range(&nodes.object, first, end), ..Bounds::EMPTY };
         bounds.shader = range(&nodes.shader, first, end);
         if let (Column::Constant(priority), Column::Values(depths)) = (&nodes.priority, &nodes.depth) {
@@ -391,18 +397,18 @@ impl PathBounds {
                 }
             }
         }
-        bounds.stylist = self.stylist(nodes, first, end);
+        bounds.stylist = self.stylist(nodes, first, end, rules);
         bounds
     }
 
-    fn stylist(&self, nodes: &NodeColumns, first: usize, end: usize) -> Stylist {
+    fn stylist(&self, nodes: &NodeColumns, first: usize, end: usize, rules: &Rules) -> Stylist {
         let Some(row) = (first..end).find(|row| self.radius_squared.get(*row) > 0.0) else { return Stylist::None };
-        let alike = match (&nodes.line_color, &nodes.line_width) {
-            (Column::Constant(_), Column::Constant(_)) => true,
-            _ => {
-                let own = style(nodes, row);
-                (row + 1..end).all(|row| self.radius_squared.get(row) <= 0.0 || style(nodes, row) == own)
-            }
+        let own = style(nodes, row);
+        // What is seen through a line depends on the pair.
+        let opaque = own.is_opaque(rules);
+        let alike = match (&nodes.line_color, &nodes.line_width, &nodes.line_opacity) {
+            (Column::Constant(_), Column::Constant(_), Column::Constant(_)) => opaque,
+            _ => opaque && (row + 1..end).all(|row| self.radius_squared.get(row) <= 0.0 || style(nodes, row) == own),
         };
         if alike { Stylist::Alike(row as u32) } else { Stylist::Many }
     }

@@ -1,6 +1,6 @@
 //! The definition as plain loops (DESIGN section 3.2), to be read beside the text. The oracle of [`super::search`].
 
-use super::pair::{Found, Pair, distance_squared};
+use super::pair::{Found, MOST_LINES, Pair, Taken, distance_squared};
 use super::window::{PathTile, PathWindow};
 use super::{LineCounts, Rules};
 use crate::sample::PixelRect;
@@ -18,17 +18,33 @@ pub(super) fn find(
         if lined[targets.nodes.rows.sample(row) as usize] {
             continue;
         }
-        let pair = seen(window, targets, row, rules, counts);
-        found.extend(pair.map(|pair| Found { row, path: targets.nodes.path, pair }));
+        let mut taken = Taken::default();
+        let mut pairs = Vec::new();
+        while pairs.len() < MOST_LINES
+            && let Some(pair) = seen(window, targets, row, &taken, rules, counts)
+        {
+            pairs.push(pair);
+            // Through a line that is not opaque, the next is seen.
+            let Some(neighbors) = &window.tiles[pair.tile as usize] else { break };
+            let (nodes, styling) = if pair.own { (targets, row) } else { (neighbors, pair.row as usize) };
+            if nodes.alpha(styling, rules) >= 1.0 {
+                break;
+            }
+            taken.take(&neighbors.features(pair.row as usize), pair.own);
+        }
+        if let Some((pair, behind)) = pairs.split_first() {
+            found.push(Found { row, path: targets.nodes.path, pair: *pair, behind: behind.to_vec() });
+        }
     }
     found
 }
 
-/// The pair that the target of a row sees.
+/// The pair that the target of a row sees, but for lines that are taken.
 fn seen(
     window: &PathWindow<'_>,
     targets: &PathTile<'_>,
     row: usize,
+    taken: &Taken,
     rules: &Rules,
     counts: &mut LineCounts,
 ) -> Option<Pair> {
@@ -51,6 +67,9 @@ fn seen(
                 // the priority sample p: the larger explicit priority, else the shorter depth, else t.
                 let own = !n.rank.outranks(t.rank);
                 let p = if own { &t } else { &n };
+                if taken.contains(&n.features, own) {
+                    continue;
+                }
                 // The pair is valid if |x_t − x_n| < r'.
                 let distance_squared = distance_squared(&t, n.pixel, n.offset);
                 if distance_squared >= p.radius_squared {

@@ -66,7 +66,7 @@ pub enum LineType {
 pub struct SeenLine {
     /// The line's colour, tinted if the rules say so.
     pub color: [f32; 3],
-    /// min(1, width / minimum width).
+    /// min(1, width / minimum width) times the line's opacity; with what is seen through it, if that is below 1.
     pub alpha: f32,
     /// The sample's colour with the line in it.
     pub lined: [f32; 3],
@@ -114,6 +114,10 @@ impl std::ops::AddAssign for LineCounts {
 ///
 /// The paths are taken in breadth-first order, each only for samples that have no line yet and have a node there
 /// (OG18 section 3.4).
+///
+/// A line that is not opaque (thinner than the minimum width, or with an opacity) shows the next one in the order of keys,
+/// and so on until they are opaque. Each surface (object and material) draws or borders at most one of a sample's lines at
+/// a path, else the many pairs that see one edge would count as many lines; there are at most 8.
 #[must_use]
 pub fn find_lines(window: &Window<'_>, target: LineTile<'_>, rules: &Rules, method: Method) -> LineBuffer {
     let mut lined = vec![false; target.buffer.samples()];

@@ -116,13 +116,39 @@ impl Pair {
 }
 
 /// The line that a target sees, before styling.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Found {
     /// The target's row at the path.
     pub row: usize,
     /// The path.
     pub path: NodePath,
     pub pair: Pair,
+    /// What is seen through it, front to back, if it is not opaque.
+    pub behind: Vec<Pair>,
+}
+
+/// Most lines of a sample, one behind the other.
+pub(super) const MOST_LINES: usize = 8;
+
+/// The lines of a target that were already seen, from the front. Each surface (object and material) draws or borders at
+/// most one of them: an edge is one line, however many pairs see it.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Taken {
+    neighbors: Vec<(u32, u32)>,
+    own: bool,
+}
+
+impl Taken {
+    /// Takes the line of a pair with a neighbour of these features.
+    pub(super) fn take(&mut self, neighbor: &Features, own: bool) {
+        self.neighbors.push((neighbor.object, neighbor.shader));
+        self.own |= own;
+    }
+
+    /// Whether a pair belongs to a line that is taken.
+    pub(super) fn contains(&self, neighbor: &Features, own: bool) -> bool {
+        (own && self.own) || self.neighbors.contains(&(neighbor.object, neighbor.shader))
+    }
 }
 
 #[cfg(test)]

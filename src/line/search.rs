@@ -17,7 +17,7 @@
 use super::bounds::{Block, Bounded, PathBounds, PixelNodes, Stylist};
 use super::differ::Tests;
 use super::lanes::{Lanes, Origin};
-use super::pair::{Found, LineNode, Pair, Rank, distance_squared};
+use super::pair::{Found, LineNode, MOST_LINES, Pair, Rank, Taken, distance_squared};
 use super::window::{LineStyle, PathTile, PathWindow};
 use super::{LineCounts, Rules};
 use crate::sample::PixelRect;
@@ -35,6 +35,7 @@ pub(super) fn find(
 ) -> Vec<Found> {
     let mut search = Search {
         window,
+        rules,
         tests: rules.tests(),
         any_pair: !rules.exact_pairs(),
         tiles: Vec::new(),
@@ -60,8 +61,11 @@ pub(super) fn find(
         }
         for place in block.first as usize..block.end as usize {
             search.search_pixel(targets, place, lined);
-            let lines = search.targets.iter().filter_map(|target| Some((target.row, target.best?)));
-            found.extend(lines.map(|(row, pair)| Found { row, path: targets.nodes.path, pair }));
+            for i in 0..search.targets.len() {
+                let Target { row, best: Some(pair), .. } = search.targets[i] else { continue };
+                let behind = search.search_behind(targets, place, i, pair);
+                found.push(Found { row, path: targets.nodes.path, pair, behind });
+            }
         }
     }
     counts.pairs_tested += search.pairs_tested;
@@ -96,6 +100,7 @@ struct Target {
     row: usize,
     node: LineNode,
     style: LineStyle,
+    opaque: bool,
     best: Option<Pair>,
 }
 
@@ -124,6 +129,7 @@ impl Target {
 /// Scratch of one search, narrowed from level to level.
 struct Search<'w, 'a> {
     window: &'w PathWindow<'a>,
+    rules: &'w Rules,
     tests: &'w Tests,
     /// Whether any pair will do that looks like the one that is seen.
     any_pair: bool,
@@ -192,7 +198,10 @@ impl<'w> Search<'w, '_> {
                 continue;
             }
             let node = nodes.node(pixel.pixel, row);
-            self.targets.push(Target { row, node, style: nodes.style(row), best: None });
+            self.targets.push({
+                let style = nodes.style(row);
+                Target { row, node, style, opaque: style.is_opaque(self.rules), best: None }
+            });
         }
         self.search_others(pixel.pixel, &bounded);
         self.search_own(pixel.pixel, &bounded);
@@ -350,7 +359,7 @@ impl<'w> Search<'w, '_> {
         let mut own = OwnTargets { highest: Rank::LAST, lowest: Rank::FIRST, thinnest: f32::INFINITY, limit: 0.0 };
         let any_pair = self.any_pair;
         // An own line looks the same whichever its neighbour is.
-        let open = |target: &&mut Target| target.wants_own() && !(any_pair && target.best.is_some());
+        let open = |target: &&mut Target| target.wants_own() && !(any_pair && target.opaque && target.best.is_some());
         for target in targets.iter_mut().filter(open) {
             if let Some(pair) = self.last_own {
                 self.test_again(target, &pair);
@@ -438,6 +447,54 @@ impl<'w> Search<'w, '_> {
         self.candidates.retain(|candidate| candidate.gap_squared <= own.limit);
         self.certain = self.candidates.iter().all(|candidate| candidate.certain);
         self.candidates.sort_unstable_by(|a, b| a.gap_squared.total_cmp(&b.gap_squared));
+    }
+
+    /// What a target of the last pixel sees through the line of a pair, front to back. Plain: few lines are not opaque.
+    fn search_behind(&mut self, nodes: &PathTile<'_>, place: usize, target: usize, first: Pair) -> Vec<Pair> {
+        let mut behind = Vec::new();
+        let bounded = nodes.bounds.of_pixel(place);
+        let mut taken = Taken::default();
+        let mut last = first;
+        while behind.len() + 1 < MOST_LINES {
+            let target = &mut self.targets[target];
+            let Some(neighbors) = &self.window.tiles[last.tile as usize] else { break };
+            let alpha = if last.own {
+                nodes.alpha(target.row, self.rules)
+            } else {
+                neighbors.alpha(last.row as usize, self.rules)
+            };
+            if alpha >= 1.0 {
+                break;
+            }
+            taken.take(&neighbors.features(last.row as usize), last.own);
+            target.best = None;
+            for near in &self.near_pixel {
+                let Some(tile) = &self.window.tiles[near.tile as usize] else { continue };
+                for place in near.block.first as usize..near.block.end as usize {
+                    let pixel = &near.bounds.pixels[place];
+                    let gap_squared = pixel_gap_squared(target.node.pixel, pixel.pixel);
+                    if !may_matter(&bounded, &near.bounds.of_pixel(place), gap_squared, self.tests)
+                        || target.best.is_some_and(|best| {
+                            best.rank.outranks(pixel.bounds.best) && (!best.own || gap_squared > best.distance_squared)
+                        })
+                    {
+                        continue;
+                    }
+                    self.pairs_tested += u64::from(pixel.end - pixel.first);
+                    for row in pixel.first..pixel.end {
+                        let own = !tile.rank(row as usize).outranks(target.node.rank);
+                        if !taken.contains(&tile.features(row as usize), own) {
+                            let origin = Origin { tile: near.tile, pixel: pixel.pixel, row };
+                            keep(self.window, self.tests, target, &origin);
+                        }
+                    }
+                }
+            }
+            let Some(pair) = target.best else { break };
+            behind.push(pair);
+            last = pair;
+        }
+        behind
     }
 
     /// Tests a target with the neighbour of another target's pair.

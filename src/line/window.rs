@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use super::Rules;
 use super::bounds::{PathBounds, TileBounds};
 use super::differ::Features;
 use super::pair::{LineNode, Rank};
@@ -141,6 +142,11 @@ impl<'a> PathTile<'a> {
         Rank::new(self.nodes.priority.get(row), self.nodes.depth.get(row))
     }
 
+    /// How much the line of a row covers, 0 … 1.
+    pub(super) fn alpha(&self, row: usize, rules: &Rules) -> f32 {
+        rules.alpha(self.nodes.line_width.get(row)) * self.nodes.line_opacity.get(row)
+    }
+
     #[inline(always)]
     pub(super) fn style(&self, row: usize) -> LineStyle {
         style(self.nodes, row)
@@ -152,17 +158,28 @@ impl<'a> PathTile<'a> {
     }
 }
 
-/// What of a node a line shows: colour and width.
+/// What of a node a line shows: colour, width and opacity.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct LineStyle {
     color: [f32; 3],
     width: f32,
+    opacity: f32,
+}
+
+impl LineStyle {
+    pub(super) fn is_opaque(&self, rules: &Rules) -> bool {
+        rules.alpha(self.width) * self.opacity >= 1.0
+    }
 }
 
 /// The style of a row.
 #[inline(always)]
 pub(super) fn style(nodes: &NodeColumns, row: usize) -> LineStyle {
-    LineStyle { color: nodes.line_color.get(row), width: nodes.line_width.get(row) }
+    LineStyle {
+        color: nodes.line_color.get(row),
+        width: nodes.line_width.get(row),
+        opacity: nodes.line_opacity.get(row),
+    }
 }
 
 /// The feature attributes of a row.

@@ -216,6 +216,8 @@ pub struct Node {
     pub line_color: [f32; 3],
     /// Full line width in pixels; ≤ 0 is no line.
     pub line_width: f32,
+    /// Opacity of the line, 0 … 1.
+    pub line_opacity: f32,
     /// Line priority.
     pub priority: i32,
     /// Product of the weights along the path from the camera, 1 at the camera.
@@ -236,6 +238,7 @@ impl Default for Node {
             depth: f32::INFINITY,
             line_color: [0.0; 3],
             line_width: 0.0,
+            line_opacity: 1.0,
             // A miss never decides a line's style, whatever the objects' priorities.
             priority: i32::MIN,
             throughput: [1.0; 3],
@@ -255,7 +258,7 @@ pub struct NodeColumnSet {
     pub feature: bool,
     /// Lines or the depth layer are on.
     pub depth: bool,
-    /// Lines are on: line colour, line width, priority.
+    /// Lines are on: line colour, line width, line opacity, priority.
     pub lines: bool,
     /// Tint or throughput composition is on and there are secondary paths.
     pub throughput: bool,
@@ -292,6 +295,8 @@ pub struct NodeColumns {
     pub line_color: Column<[f32; 3]>,
     /// Line widths in pixels.
     pub line_width: Column<f32>,
+    /// Opacities of the lines.
+    pub line_opacity: Column<f32>,
     /// Line priorities.
     pub priority: Column<i32>,
     /// Path throughputs.
@@ -336,6 +341,7 @@ impl NodeColumns {
             + self.depth.bytes()
             + self.line_color.bytes()
             + self.line_width.bytes()
+            + self.line_opacity.bytes()
             + self.priority.bytes()
             + self.throughput.bytes()
             + self.contribution.bytes()

@@ -167,6 +167,7 @@ struct PathRows {
     depth: Column<f32>,
     line_color: Column<[f32; 3]>,
     line_width: Column<f32>,
+    line_opacity: Column<f32>,
     priority: Column<i32>,
     throughput: Column<[f32; 3]>,
     contribution: Column<[f32; 3]>,
@@ -188,6 +189,7 @@ impl PathRows {
             depth: Column::Constant(neutral.depth),
             line_color: Column::Constant(neutral.line_color),
             line_width: Column::Constant(neutral.line_width),
+            line_opacity: Column::Constant(neutral.line_opacity),
             priority: Column::Constant(neutral.priority),
             throughput: Column::Constant(neutral.throughput),
             contribution: Column::Constant(neutral.contribution),
@@ -215,6 +217,7 @@ impl PathRows {
         if kept.lines {
             self.line_color.push(row, node.line_color, expected);
             self.line_width.push(row, node.line_width, expected);
+            self.line_opacity.push(row, node.line_opacity, expected);
             self.priority.push(row, node.priority, expected);
         }
         if kept.throughput {
@@ -261,6 +264,7 @@ impl PathRows {
             depth: self.depth.ordered(order),
             line_color: self.line_color.ordered(order),
             line_width: self.line_width.ordered(order),
+            line_opacity: self.line_opacity.ordered(order),
             priority: self.priority.ordered(order),
             throughput: self.throughput.ordered(order),
             contribution: self.contribution.ordered(order),

@@ -90,6 +90,7 @@ impl Samples {
             ),
             line_color: Column::Constant([0.0; 3]),
             line_width: Column::Constant(1.0),
+            line_opacity: Column::Constant(1.0),
             priority: Column::Constant(0),
             throughput: Column::Constant([1.0; 3]),
             contribution: Column::Constant([0.0; 3]),

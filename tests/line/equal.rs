@@ -36,23 +36,29 @@ fn node() -> impl Strategy<Value = Node> {
         (0..3u32, 1..3u32, [unit(), unit()], few(normals), [unit(), unit(), unit()]),
         // Equal depths must be common: they are what ties are about.
         prop_oneof![3 => few([1.0, 2.0, 3.0]), 1 => 1.0..3.0f32],
-        few([0.0, -1.0, 0.1, 0.5, 1.0, 2.5, 4.0, 1e9, f32::NAN]),
+        (
+            few([0.0, -1.0, 0.1, 0.5, 1.0, 2.5, 4.0, 1e9, f32::NAN]),
+            few([1.0, 1.0, 1.0, 1.0, 0.5, 0.25, 0.0, f32::NAN, 7.0, -1.0]),
+        ),
         few([0, 0, 0, 1, -1, i32::MIN, i32::MAX]),
         ([unit(), unit(), unit()], [unit(), unit(), unit()], [unit(), unit(), unit()]),
     )
-        .prop_map(|((object, shader, uv, normal, feature), depth, line_width, priority, colors)| Node {
-            object,
-            shader,
-            uv,
-            normal,
-            feature,
-            depth,
-            line_color: colors.0,
-            line_width,
-            priority,
-            throughput: colors.1,
-            contribution: colors.2,
-        })
+        .prop_map(
+            |((object, shader, uv, normal, feature), depth, (line_width, line_opacity), priority, colors)| Node {
+                object,
+                shader,
+                uv,
+                normal,
+                feature,
+                depth,
+                line_color: colors.0,
+                line_width,
+                line_opacity,
+                priority,
+                throughput: colors.1,
+                contribution: colors.2,
+            },
+        )
 }
 
 /// Random pixels as a renderer makes them: mostly one of a few nodes, so that some blocks are uniform.
