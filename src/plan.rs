@@ -90,9 +90,9 @@ impl Plan {
         let tests = scene.lines();
         let wants_feature = tests.feature.is_some() || layers.contains(&Layer::Feature);
 
-        let lights = !scene.lights().is_empty();
+        let has_lights = !scene.lights().is_empty();
         let mut materials: Vec<MaterialPlan> =
-            shaders.iter().zip(&used).map(|(shader, used)| plan_material(shader, lights, color, *used)).collect();
+            shaders.iter().zip(&used).map(|(shader, used)| plan_material(shader, has_lights, color, *used)).collect();
         let any = |what: fn(&MaterialPlan) -> bool| materials.iter().any(|m| m.used && what(m));
         let reflects = any(|m| m.reflects);
         let passes = any(|m| m.refracts || m.see_through);
@@ -103,11 +103,15 @@ impl Plan {
         for (material, shader) in materials.iter_mut().zip(shaders.iter()) {
             let may = may_write(shader.analysis());
             if lines.is_some() {
-                material.wanted |= may & (OutputSet::LINE_COLOR | OutputSet::LINE_WIDTH | OutputSet::PRIORITY);
+                material.wanted |= may
+                    & (OutputSet::LINE_COLOR | OutputSet::LINE_WIDTH | OutputSet::LINE_OPACITY | OutputSet::PRIORITY);
             }
             if wants_feature && (lines.is_some() || layers.contains(&Layer::Feature)) {
                 material.wanted |= may & OutputSet::FEATURE;
             }
+            // Only now is it known what is asked of the shader, and so what it reads.
+            material.inputs = shader.needs(material.wanted | marker(color, lines.is_some()));
+            material.lights = has_lights && (material.lit || material.inputs.intersects(InputSet::LIGHTS));
         }
 
         let secondary = reflection_depth + refraction_depth > 0;
@@ -130,6 +134,7 @@ impl Plan {
             position: layers.contains(&Layer::Position),
             aovs,
             max_width: tests.max_width,
+            declared_widths: shaders.iter().map(|shader| shader.params().max_line_width()).collect(),
             materials: materials.len(),
         };
         let shadow_rays = materials.iter().any(|m| m.used && m.lights) && scene.lights().iter().any(|l| l.shadows);
@@ -154,6 +159,14 @@ impl Plan {
     pub fn has_secondary_rays(&self) -> bool {
         self.reflection_depth + self.refraction_depth > 0
     }
+}
+
+/// Outputs that mark a hit whose script failed, which no analysis of the script foresees.
+#[must_use]
+pub fn marker(color: bool, lines: bool) -> OutputSet {
+    let color = if color { OutputSet::COLOR } else { OutputSet::empty() };
+    let width = if lines { OutputSet::LINE_WIDTH } else { OutputSet::empty() };
+    color | width
 }
 
 fn used_materials(scene: &Scene) -> Vec<bool> {
@@ -207,10 +220,10 @@ fn plan_material(shader: &Shader, lights: bool, color: bool, used: bool) -> Mate
     }
     MaterialPlan {
         wanted: wanted & may_write(analysis),
-        inputs: shader.needs(),
+        inputs: InputSet::empty(),
         mode: shader.mode(),
         lit,
-        lights: lights && (lit || analysis.inputs.intersects(InputSet::LIGHTS)),
+        lights: false,
         reflects,
         refracts,
         see_through,
@@ -242,8 +255,9 @@ fn plan_lines(scene: &Scene, shaders: &Shaders, layers: &[Layer], used: &[bool])
         .enumerate()
         .filter(|(_, draws)| **draws)
         .map(|(index, _)| {
-            let fact = shaders.of(MaterialId::from_index(index)).analysis().output(OutputSet::LINE_WIDTH);
-            bounds(fact, settings.width).map_or(settings.max_width, |b| b[1]).min(settings.max_width)
+            let shader = shaders.of(MaterialId::from_index(index));
+            let found = bounds(shader.analysis().output(OutputSet::LINE_WIDTH), settings.width).map(|b| b[1]);
+            found.into_iter().chain(shader.params().max_line_width()).fold(settings.max_width, f32::min)
         })
         .fold(0.0, f32::max);
     if widest <= 0.0 {

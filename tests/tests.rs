@@ -10,8 +10,10 @@ mod scene_file;
 mod analysis;
 mod plan;
 mod shade;
+mod shader_check;
 // ... rays, lines and pixels, ...
 mod film;
+mod footprint;
 mod light;
 mod line;
 mod trace;

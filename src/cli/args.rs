@@ -31,6 +31,12 @@ pub enum Command {
     Render(Box<RenderArguments>),
     /// Prints what a render would do, with reasons, without making a pixel.
     Explain(Box<ExplainArguments>),
+    /// Checks, measures, starts and shows shaders.
+    Shader {
+        /// What to do.
+        #[command(subcommand)]
+        command: super::shader::ShaderCommand,
+    },
     /// Compares two pictures; exits with 1 if they differ by more than the tolerance.
     Compare(CompareArguments),
     /// Prints the JSON schema of scene files, for editors.

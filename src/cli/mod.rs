@@ -7,6 +7,7 @@ mod compare;
 mod explain;
 mod render;
 mod request;
+mod shader;
 mod terminal;
 
 use std::io::Write;
@@ -53,6 +54,7 @@ pub fn run() -> u8 {
     let result = match arguments.command {
         Command::Render(arguments) => render::run(&arguments),
         Command::Explain(arguments) => explain::run(&arguments),
+        Command::Shader { command } => shader::run(&command),
         Command::Compare(arguments) => compare::run(&arguments),
         Command::Schema => print(&format!("{:#}\n", crate::scene::file::schema())),
         Command::Completions { shell } => {

@@ -9,14 +9,19 @@ use crate::diag::{Diagnostics, Severity};
 
 /// Prints diagnostics with their snippets, and how many errors there were if more than one.
 pub fn say(diagnostics: &Diagnostics) {
+    show(diagnostics);
+    let errors = diagnostics.0.iter().filter(|d| d.severity == Severity::Error).count();
+    if errors > 1 {
+        note(&format!("{errors} errors"));
+    }
+}
+
+/// Prints diagnostics with their snippets.
+pub fn show(diagnostics: &Diagnostics) {
     let mut err = std::io::stderr().lock();
     let color = err.is_terminal() && std::env::var_os("NO_COLOR").is_none();
     for diagnostic in &diagnostics.0 {
         let _ = writeln!(err, "{}\n", diagnostic.render(color));
-    }
-    let errors = diagnostics.0.iter().filter(|d| d.severity == Severity::Error).count();
-    if errors > 1 {
-        let _ = writeln!(err, "{errors} errors");
     }
 }
 

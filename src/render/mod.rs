@@ -376,7 +376,7 @@ impl<'a> Render<'a> {
                 plan: self.plan.to_string(),
             },
             script_errors: errors.into_diagnostics(),
-            warnings: gate_warnings(self.scene, &totals.gate),
+            warnings: gate_warnings(self.scene, self.shaders, &totals.gate),
             complete: self.complete,
             written: false,
         }
@@ -384,9 +384,10 @@ impl<'a> Render<'a> {
 }
 
 /// What the gate stopped, as a warning for each material and kind.
-fn gate_warnings(scene: &Scene, gate: &[GateCounts]) -> Diagnostics {
+fn gate_warnings(scene: &Scene, shaders: &Shaders, gate: &[GateCounts]) -> Diagnostics {
     let mut warnings = Diagnostics::default();
-    for (material, counts) in scene.materials().iter().zip(gate.get(1..).unwrap_or_default()) {
+    let materials = scene.materials().iter().zip(shaders.iter());
+    for ((material, shader), counts) in materials.zip(gate.get(1..).unwrap_or_default()) {
         let script = &scene.scripts()[material.script.index()].source.name;
         let mut warn = |count: u64, what: &str, hint: String| {
             if count > 0 {
@@ -403,10 +404,16 @@ fn gate_warnings(scene: &Scene, gate: &[GateCounts]) -> Diagnostics {
         warn(counts.nan, "NaN", "NaN counts as 0; look for 0/0, sqrt or ln of negative numbers".into());
         warn(counts.infinite, "an infinite number", "infinity counts as 0; look for divisions by 0".into());
         warn(counts.negative, "a negative line width", "a width of 0 or less draws no line".into());
+        let max_width = scene.lines().max_width;
+        let declared = shader.params().max_line_width().filter(|declared| *declared < max_width);
+        let (name, limit, place) = match declared {
+            Some(declared) => ("max_line_width", declared, "the shader's `params()`"),
+            None => ("max_width", max_width, "[lines]"),
+        };
         warn(
             counts.clamped_widths,
-            &format!("a line wider than max_width ({} px)", scene.lines().max_width),
-            "wider lines are drawn at max_width; raise it in [lines] if they are meant".into(),
+            &format!("a line wider than {name} ({limit} px)"),
+            format!("wider lines are drawn at {name}; raise it in {place} if they are meant"),
         );
     }
     warnings

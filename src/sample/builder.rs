@@ -21,8 +21,18 @@ pub struct SampleLayout {
     pub aovs: usize,
     /// Line widths above this, in pixels, are clamped by the gate.
     pub max_width: f32,
+    /// Lower bounds of the same kind by material, where its shader declares one. May be shorter than `materials`.
+    pub declared_widths: Vec<Option<f32>>,
     /// Materials in the scene: `shader` values are 0 … this, included.
     pub materials: usize,
+}
+
+impl SampleLayout {
+    /// The widest line that the gate lets pass for a shader (its id, from 1).
+    fn max_width_of(&self, shader: u32) -> f32 {
+        let declared = (shader as usize).checked_sub(1).and_then(|index| *self.declared_widths.get(index)?);
+        declared.map_or(self.max_width, |declared| declared.min(self.max_width))
+    }
 }
 
 /// Fills a [`SampleBuffer`]. Nodes of one path may arrive in any order of samples; the order of the samples is the
@@ -101,7 +111,7 @@ impl SampleBufferBuilder {
     /// dropped here; the gate checks the others.
     pub fn push(&mut self, path: NodePath, sample: u32, node: Node) {
         assert!((sample as usize) < self.offset.len(), "sample {sample} lies outside the buffer");
-        let (node, faults) = clean_node(node, self.layout.columns, self.layout.max_width);
+        let (node, faults) = clean_node(node, self.layout.columns, self.layout.max_width_of(node.shader));
         self.gate.note(path, sample, node.shader, faults);
         if self.paths[self.last].path != path {
             self.last = self.paths.iter().position(|rows| rows.path == path).unwrap_or_else(|| {

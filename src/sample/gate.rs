@@ -23,7 +23,7 @@ pub struct GateCounts {
     pub infinite: u64,
     /// Nodes with a negative line width.
     pub negative: u64,
-    /// Nodes whose line width was clamped to `max_width`.
+    /// Nodes whose line width was clamped to `max_width`, or to what their shader declares.
     pub clamped_widths: u64,
 }
 

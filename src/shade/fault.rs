@@ -7,8 +7,11 @@ use std::sync::Arc;
 
 use rhai::{Dynamic, EvalAltResult, LexError, ParseError, ParseErrorType, Position};
 
+use super::closures;
 use super::host::{MAX_ARRAY, MAX_CALL_DEPTH, MAX_EXPRESSION_DEPTH, MAX_MAP, MAX_OPERATIONS, MAX_TEXT};
 use super::library;
+use super::names::{AOV_PREFIX, OutputSet};
+use super::script::Functions;
 use crate::diag::{Diagnostic, Source, Span, nearest};
 
 /// An error raised by a library function; the interpreter adds the place of the call.
@@ -63,13 +66,20 @@ pub(super) fn span(source: &Arc<Source>, position: Position) -> Span {
     }
 }
 
+/// What the message of a script begins with that ran out of operations.
+pub(super) const OUT_OF_OPERATIONS: &str = "the script did not finish within";
+
 /// An error of the parser.
 pub(super) fn from_parse_error(error: &ParseError, source: &Arc<Source>) -> Diagnostic {
     use ParseErrorType as Kind;
     let fault = match error.err_type() {
         Kind::UnexpectedEOF => Fault::new("the script ends too early").hint("is a closing `}` or `)` missing?"),
         Kind::BadInput(LexError::ImproperSymbol(_, told)) if !told.is_empty() => Fault::new(lower_first(told)),
-        Kind::VariableUndefined(name) => unknown_variable(name),
+        Kind::BadInput(LexError::UnterminatedString) => {
+            Fault::new("this text has no end").hint("is a closing `\"` missing?")
+        }
+        Kind::VariableUndefined(name) => undefined_variable(name, source, error.position()),
+        Kind::Reserved(word) => Fault::new(format!("`{word}` is a reserved word")).hint("give it another name"),
         Kind::ModuleUndefined(name) => Fault::new(format!("there is no module `{name}`")),
         Kind::ExprTooDeep => Fault::new(format!("this is nested more than {MAX_EXPRESSION_DEPTH} levels deep"))
             .hint("give parts of it a name with `let`, or put them into functions"),
@@ -77,7 +87,13 @@ pub(super) fn from_parse_error(error: &ParseError, source: &Arc<Source>) -> Diag
         Kind::FnDuplicatedDefinition(name, count) => {
             Fault::new(format!("there are two functions `{name}` with {count} parameters"))
         }
+        Kind::MissingToken(token, place) if token == ":" && place.contains("object map") => {
+            let key = place.split('\'').nth(1).unwrap_or_default();
+            Fault::new(format!("expected `:` and a value after the key `{key}` of this record"))
+                .hint("a record is written #{ base_color: rgb(0.8, 0.2, 0.1), line_width: 2.0 }")
+        }
         Kind::MissingToken(token, place) => {
+            let place = place.replace("object map literal", "record");
             let fault = Fault::new(format!("expected `{token}` {place}"));
             let rest = source.text[span(source, error.position()).range.start..].trim();
             if rest.is_empty() { fault.hint("the script ends here: is a closing `}` or `)` missing?") } else { fault }
@@ -89,42 +105,67 @@ pub(super) fn from_parse_error(error: &ParseError, source: &Arc<Source>) -> Diag
     fault.at(span(source, error.position()))
 }
 
-/// An error of a run, at its innermost place.
-pub(super) fn from_run(error: &EvalAltResult, source: &Arc<Source>, functions: &[(String, usize)]) -> Diagnostic {
+/// An error of a run, at its innermost place. `files` and `functions` are the program's, `surface` is where to point if
+/// the engine knows no place.
+pub(super) fn from_run(
+    error: &EvalAltResult,
+    surface: &Span,
+    files: &[Arc<Source>],
+    functions: &Functions,
+) -> Diagnostic {
     let mut place = error.position();
+    let mut file = 0;
+    let mut at = 0;
     let mut error = error;
     let mut callers = Vec::new();
-    while let EvalAltResult::ErrorInFunctionCall(name, _, inner, call) = error {
-        callers.push((name.as_str(), *call));
+    while let EvalAltResult::ErrorInFunctionCall(called, _, inner, call) = error {
+        callers.push((called.as_str(), at, *call));
+        // A closure is called within its own file.
+        at = functions.iter().find(|((key, _), f)| key == called && !f.is_closure()).map_or(at, |(_, f)| f.file);
         error = inner;
         if !inner.position().is_none() {
             place = inner.position();
+            file = at;
         }
     }
-    let mut fault = explain(error, functions);
-    for (name, call) in callers.iter().rev().filter(|(_, call)| !call.is_none()) {
+    let mut fault = explain(error, functions, file);
+    for (called, from, call) in callers.iter().rev().filter(|(_, _, call)| !call.is_none()) {
         let (line, column) = (call.line().unwrap_or(0), call.position().unwrap_or(0));
-        fault = fault.hint(format!("`{name}` was called at line {line}, column {column}"));
+        let what = match written(called, functions) {
+            Some(name) => format!("`{name}`"),
+            None => "the closure".to_owned(),
+        };
+        fault = fault.hint(if *from == file {
+            format!("{what} was called at line {line}, column {column}")
+        } else {
+            format!("{what} was called at {}:{line}:{column}", files[*from].name)
+        });
     }
-    fault.at(span(source, place))
+    fault.at(if place.is_none() { surface.clone() } else { span(&files[file], place) })
 }
 
-fn explain(error: &EvalAltResult, functions: &[(String, usize)]) -> Fault {
+/// A function's name as written; `None` for closures.
+fn written<'n>(called: &'n str, functions: &'n Functions) -> Option<&'n str> {
+    if called.starts_with(closures::PREFIX) {
+        return None;
+    }
+    Some(functions.iter().find(|((key, _), _)| key == called).map_or(called, |(_, function)| &function.name))
+}
+
+fn explain(error: &EvalAltResult, functions: &Functions, file: usize) -> Fault {
     use EvalAltResult as Kind;
     match error {
         Kind::ErrorRuntime(token, _) => match token.read_lock::<Fault>() {
             Some(fault) => fault.clone(),
             None => Fault::new(format!("the script stopped itself: {token}")),
         },
-        Kind::ErrorFunctionNotFound(signature, _) => unknown_function(signature, functions),
+        Kind::ErrorFunctionNotFound(signature, _) => unknown_function(signature, functions, file),
         Kind::ErrorVariableNotFound(name, _) => unknown_variable(name),
         Kind::ErrorPropertyNotFound(name, _) => Fault::new(format!("this record has no `{name}`"))
             .hint(format!("`\"{name}\" in record` tells whether it has")),
         Kind::ErrorDotExpr(message, _) => unknown_property(message),
-        Kind::ErrorTooManyOperations(_) => {
-            Fault::new(format!("the script did not finish within {MAX_OPERATIONS} operations"))
-                .hint("is there a loop without an end?")
-        }
+        Kind::ErrorTooManyOperations(_) => Fault::new(format!("{OUT_OF_OPERATIONS} {MAX_OPERATIONS} operations"))
+            .hint("is there a loop without an end?"),
         Kind::ErrorStackOverflow(_) => Fault::new(format!("functions call each other more than {MAX_CALL_DEPTH} deep"))
             .hint("does a function call itself without an end?"),
         Kind::ErrorDataTooLarge(what, _) if what.contains("string") => {
@@ -158,6 +199,42 @@ fn explain(error: &EvalAltResult, functions: &[(String, usize)]) -> Fault {
     }
 }
 
+/// A variable that the parser does not know: what else the text around it may mean.
+fn undefined_variable(name: &str, source: &Source, position: Position) -> Fault {
+    let start = source.offset(position.line().unwrap_or(1), position.position().unwrap_or(1));
+    let behind = source.text[start..].strip_prefix(name).unwrap_or_default().trim_start();
+    let is_key = OutputSet::spelled(name).is_some() || name.starts_with(AOV_PREFIX);
+    if is_key && behind.starts_with(':') {
+        return Fault::new(format!("there is no variable `{name}` here")).hint("a record begins with `#{`, not `{`");
+    }
+    let declared = |line: &str| {
+        let mut words = line.split(|c: char| !c.is_alphanumeric() && c != '_').filter(|word| !word.is_empty());
+        matches!(words.next(), Some("let" | "const")) && words.next() == Some(name)
+    };
+    if source.text.lines().any(|line| !line.starts_with([' ', '\t']) && declared(line)) {
+        return Fault::new(format!("there is no variable `{name}` here"))
+            .hint("functions do not see what stands outside of them: move it into `params()` or into this function");
+    }
+    let fault = unknown_variable(name);
+    let names = declared_names(&source.text);
+    match nearest(name, names.iter().copied().filter(|known| *known != name)) {
+        Some(near) if fault.hints.is_empty() => fault.hint(format!("did you mean `{near}`?")),
+        _ => fault,
+    }
+}
+
+/// Every name that a text declares by `let` or `const` anywhere.
+fn declared_names(text: &str) -> Vec<&str> {
+    let mut words = text.split(|c: char| !c.is_alphanumeric() && c != '_').filter(|word| !word.is_empty());
+    let mut names = Vec::new();
+    while let Some(word) = words.next() {
+        if matches!(word, "let" | "const") {
+            names.extend(words.next());
+        }
+    }
+    names
+}
+
 fn unknown_variable(name: &str) -> Fault {
     let fault = Fault::new(format!("there is no variable `{name}` here"));
     match name {
@@ -167,7 +244,7 @@ fn unknown_variable(name: &str) -> Fault {
 }
 
 /// `signature` is as Rhai writes it: `name (type, type)`.
-fn unknown_function(signature: &str, functions: &[(String, usize)]) -> Fault {
+fn unknown_function(signature: &str, functions: &Functions, file: usize) -> Fault {
     let (name, types) = signature.split_once(" (").unwrap_or((signature, ")"));
     let types: Vec<_> =
         types.trim_end_matches(')').split(", ").filter(|name| !name.is_empty()).map(type_name).collect();
@@ -178,10 +255,18 @@ fn unknown_function(signature: &str, functions: &[(String, usize)]) -> Fault {
             _ => Fault::new(format!("`{name}` does not work on {}", types.join(", "))),
         };
     }
-    let own: Vec<_> = functions.iter().filter(|(known, _)| known == name).collect();
+    if name.starts_with(closures::PREFIX) {
+        return Fault::new("the closure is called with another number of arguments than it has parameters");
+    }
+    let all: Vec<(&str, usize)> = functions
+        .iter()
+        .filter(|(_, function)| function.file == file && !function.is_closure())
+        .map(|((_, count), function)| (function.name.as_str(), *count))
+        .collect();
+    let own: Vec<_> = all.iter().filter(|(known, _)| *known == name).collect();
     let library: Vec<_> = library::functions().filter(|known| known.name == name).collect();
     if own.is_empty() && library.is_empty() {
-        let names = functions.iter().map(|(name, _)| name.as_str()).chain(library::functions().map(|f| f.name));
+        let names = all.iter().map(|(name, _)| *name).chain(library::functions().map(|f| f.name));
         let fault = Fault::new(format!("there is no function `{name}`"));
         return match nearest(name, names) {
             Some(near) => fault.hint(format!("did you mean `{near}`?")),
@@ -222,6 +307,7 @@ pub(super) fn type_name(rhai: &str) -> String {
         "&str | ImmutableString | String" | "string" => "text",
         "map" => "record",
         "Fn" => "function",
+        other if other.contains("ops::range::Range") => "range",
         other => other,
     }
     .to_owned()

@@ -1,4 +1,5 @@
-//! Running shaders over batches with the Rhai interpreter: the reference that defines what a script means.
+//! Running shaders over batches: with kernels where there are any, and with the Rhai interpreter, the reference that
+//! defines what a script means.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -6,6 +7,7 @@ use std::sync::Arc;
 use rhai::{Caches, Dynamic, Engine, EvalAltResult};
 
 use super::batch::{HitBatch, OutputBatch};
+use super::kernel::{Kernel, Registers, Slice};
 use super::library::Hit;
 use super::names::OutputSet;
 use super::output::{self, Row};
@@ -82,6 +84,8 @@ struct Memory {
     caches: Caches,
     /// The one result of a constant shader, or of a shader that ran out of operations.
     fixed: Option<Result<Row, Diagnostic>>,
+    /// Kernels and slices, by number of lights and by outputs.
+    slices: Vec<(usize, OutputSet, Arc<Kernel>, Arc<Slice>)>,
 }
 
 /// A thread's own shading context: its engine and scratch memory. It is costly to make (half a millisecond): keep it.
@@ -90,7 +94,11 @@ pub struct Shading<'a> {
     engine: Engine,
     memories: Vec<Memory>,
     batch: Arc<HitBatch>,
+    registers: Registers,
+    /// Rows that a kernel has given up.
+    failed: Vec<usize>,
     evaluations: u64,
+    kernel_hits: u64,
 }
 
 impl std::fmt::Debug for Shading<'_> {
@@ -104,10 +112,25 @@ impl<'a> Shading<'a> {
     #[must_use]
     pub fn new(scene: &'a Scene, shaders: &'a Shaders) -> Self {
         let memories = scene.materials().iter().map(|_| Memory::default()).collect();
-        Self { shaders, engine: shaders.engine(), memories, batch: Arc::default(), evaluations: 0 }
+        Self {
+            shaders,
+            engine: shaders.engine(),
+            memories,
+            batch: Arc::default(),
+            registers: Registers::default(),
+            failed: Vec::new(),
+            evaluations: 0,
+            kernel_hits: 0,
+        }
     }
 
-    /// How often this context has run a `surface`.
+    /// How many hits kernels have shaded, those included that the interpreter was then asked about.
+    #[must_use]
+    pub fn kernel_hits(&self) -> u64 {
+        self.kernel_hits
+    }
+
+    /// How often the interpreter has run a `surface` in this context.
     #[must_use]
     pub fn evaluations(&self) -> u64 {
         self.evaluations
@@ -130,6 +153,14 @@ impl<'a> Shading<'a> {
         output::start(outputs, self.shaders.aovs().len());
         let shader = self.shaders.of(material);
         let constant = shader.mode() == Mode::Constant;
+        if shader.mode() == Mode::Kernel
+            && self.memories[material.index()].fixed.is_none()
+            && knows_attributes(shader, hits)
+            && let Some((kernel, slice)) = self.slice(shader, material, hits.light_count, wanted)
+        {
+            self.run_kernel(&kernel, &slice, material, hits, wanted, outputs, errors);
+            return;
+        }
         if !constant {
             // Scripts can hold only what is owned; a copy for each batch costs little beside running it.
             self.batch = Arc::new(hits.clone());
@@ -145,6 +176,68 @@ impl<'a> Shading<'a> {
             }
             repeat(&result, 1, wanted, outputs, errors);
         }
+    }
+
+    /// The kernel of a material for so many lights, and its slice for these outputs.
+    fn slice(
+        &mut self,
+        shader: &Shader,
+        material: MaterialId,
+        lights: usize,
+        wanted: OutputSet,
+    ) -> Option<(Arc<Kernel>, Arc<Slice>)> {
+        let known = &mut self.memories[material.index()].slices;
+        if let Some((.., kernel, slice)) = known.iter().find(|(count, set, ..)| (*count, *set) == (lights, wanted)) {
+            return Some((Arc::clone(kernel), Arc::clone(slice)));
+        }
+        let kernel = shader.kernel(lights)?;
+        let slice = kernel.slice(wanted);
+        known.push((lights, wanted, Arc::clone(&kernel), Arc::clone(&slice)));
+        Some((kernel, slice))
+    }
+
+    /// Shades a batch with a kernel. Hits that it gives up are run by the interpreter, which alone knows what becomes
+    /// of them.
+    #[expect(clippy::too_many_arguments, reason = "the arguments of `shade`, and what it has found")]
+    fn run_kernel(
+        &mut self,
+        kernel: &Kernel,
+        slice: &Slice,
+        material: MaterialId,
+        hits: &HitBatch,
+        wanted: OutputSet,
+        outputs: &mut OutputBatch,
+        errors: &mut ShadeErrors,
+    ) {
+        let shader = self.shaders.of(material);
+        let mut failed = std::mem::take(&mut self.failed);
+        failed.clear();
+        kernel.run(slice, hits, self.shaders.aovs(), &mut self.registers, outputs, &mut failed);
+        output::fill_up(hits.len, wanted, outputs);
+        self.kernel_hits += hits.len as u64;
+        if !failed.is_empty() {
+            self.batch = Arc::new(hits.clone());
+        }
+        for &row in &failed {
+            let (result, endless) = self.evaluate(shader, material, row);
+            // As without kernels, a shader that has run out of operations is given up from here on.
+            let rows = if endless { row..hits.len } else { row..row + 1 };
+            let marker;
+            let values = match &result {
+                Ok(values) => values,
+                Err(diagnostic) => {
+                    errors.add(diagnostic.clone(), rows.len() as u64);
+                    marker = Row::marker();
+                    &marker
+                }
+            };
+            rows.for_each(|row| output::replace(row, values, wanted, outputs));
+            if endless {
+                self.memories[material.index()].fixed = Some(result);
+                break;
+            }
+        }
+        self.failed = failed;
     }
 
     /// Runs `surface` at one hit. The second value tells whether it ran out of operations.
@@ -186,4 +279,11 @@ fn repeat(
     for _ in 0..count {
         output::append(row, wanted, outputs);
     }
+}
+
+/// Whether the attributes of a batch are those of the scene, for which its kernels were made.
+fn knows_attributes(shader: &Shader, hits: &HitBatch) -> bool {
+    hits.attribute_set.is_empty()
+        || Arc::ptr_eq(&hits.attributes, &shader.attributes)
+        || hits.attributes == shader.attributes
 }

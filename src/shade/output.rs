@@ -24,6 +24,7 @@ pub(super) struct Row {
     feature: Option<Vec3>,
     line_color: Option<Vec3>,
     line_width: Option<f32>,
+    line_opacity: Option<f32>,
     priority: Option<i32>,
     color: Option<Vec3>,
     /// By place in the list of names; may be shorter than it.
@@ -36,6 +37,23 @@ pub(super) struct RowFault {
     pub fault: Fault,
 }
 
+/// Values of outputs that a script leaves out.
+pub(super) mod defaults {
+    use crate::math::Vec3;
+
+    pub const BASE_COLOR: Vec3 = Vec3::splat(0.8);
+    pub const METALLIC: f32 = 0.0;
+    pub const ROUGHNESS: f32 = 1.0;
+    pub const SPECULAR: f32 = 1.0;
+    pub const IOR: f32 = 1.5;
+    pub const TRANSMISSION: f32 = 0.0;
+    pub const OPACITY: f32 = 1.0;
+    pub const EMISSION: Vec3 = Vec3::ZERO;
+    pub const OCCLUSION: f32 = 1.0;
+    pub const FEATURE: Vec3 = Vec3::ZERO;
+    pub const LINE_OPACITY: f32 = 1.0;
+}
+
 impl Row {
     /// What a hit gets whose script failed: it shines in a colour that no one chooses, and draws no line.
     pub fn marker() -> Self {
@@ -46,7 +64,11 @@ impl Row {
     pub fn read(value: &Dynamic, aovs: &[String]) -> Result<Self, RowFault> {
         let Ok(record) = value.as_map_ref() else {
             let fault = Fault::new(format!("`surface` must return a record, but it returned {}", kind(value)));
-            let hint = if value.is_unit() { "is there a `;` after the record?" } else { "return #{ base_color: … }" };
+            let hint = if value.is_unit() {
+                "the record comes last: a `let`, a loop, or an `if` without `else` gives nothing"
+            } else {
+                "return #{ base_color: … }"
+            };
             return Err(RowFault { key: None, fault: fault.hint(hint) });
         };
         let mut row = Self::default();
@@ -73,6 +95,7 @@ impl Row {
             "feature" => self.feature = color()?,
             "line_color" => self.line_color = color()?,
             "line_width" => self.line_width = number()?,
+            "line_opacity" => self.line_opacity = number()?,
             "priority" => self.priority = Some(whole(key, value)?),
             "color" => self.color = color()?,
             _ => {
@@ -146,12 +169,13 @@ pub(super) fn start(outputs: &mut OutputBatch, aovs: usize) {
         feature,
         line_color,
         line_width,
+        line_opacity,
         priority,
         color,
         aovs: extra,
     } = outputs;
     *len = 0;
-    for column in [metallic, roughness, specular, ior, transmission, opacity, occlusion] {
+    for column in [metallic, roughness, specular, ior, transmission, opacity, occlusion, line_opacity] {
         column.clear();
     }
     for column in [base_color, emission, feature] {
@@ -166,34 +190,55 @@ pub(super) fn start(outputs: &mut OutputBatch, aovs: usize) {
     extra.iter_mut().for_each(Vec::clear);
 }
 
+/// Does something with each wanted column, and the value that a row has there.
+macro_rules! columns {
+    ($outputs:ident, $wanted:ident, $row:expr, |$column:ident, $value:ident| $then:expr) => {{
+        columns!(@each $outputs $wanted $column $value $then;
+            BASE_COLOR base_color $row.base_color.unwrap_or(defaults::BASE_COLOR);
+            METALLIC metallic $row.metallic.unwrap_or(defaults::METALLIC);
+            ROUGHNESS roughness $row.roughness.unwrap_or(defaults::ROUGHNESS);
+            SPECULAR specular $row.specular.unwrap_or(defaults::SPECULAR);
+            IOR ior $row.ior.unwrap_or(defaults::IOR);
+            TRANSMISSION transmission $row.transmission.unwrap_or(defaults::TRANSMISSION);
+            OPACITY opacity $row.opacity.unwrap_or(defaults::OPACITY);
+            EMISSION emission $row.emission.unwrap_or(defaults::EMISSION);
+            NORMAL normal $row.normal;
+            OCCLUSION occlusion $row.occlusion.unwrap_or(defaults::OCCLUSION);
+            FEATURE feature $row.feature.unwrap_or(defaults::FEATURE);
+            LINE_COLOR line_color $row.line_color;
+            LINE_WIDTH line_width $row.line_width;
+            PRIORITY priority $row.priority;
+            COLOR color $row.color;
+            LINE_OPACITY line_opacity $row.line_opacity.unwrap_or(defaults::LINE_OPACITY);
+        );
+        for (index, $column) in $outputs.aovs.iter_mut().enumerate() {
+            let $value = $row.aovs.get(index).copied().flatten().unwrap_or(Vec3::ZERO);
+            $then;
+        }
+    }};
+    (@each $outputs:ident $wanted:ident $column:ident $value:ident $then:expr; $($flag:ident $name:ident $of_row:expr;)*) => { $(
+        if $wanted.contains(OutputSet::$flag) {
+            let $column = &mut $outputs.$name;
+            let $value = $of_row;
+            $then;
+        }
+    )* };
+}
+
 /// Appends a row to the wanted columns and to the extra ones.
 pub(super) fn append(row: &Row, wanted: OutputSet, outputs: &mut OutputBatch) {
-    macro_rules! columns {
-        ($($flag:ident $column:ident $value:expr;)*) => { $(
-            if wanted.contains(OutputSet::$flag) {
-                outputs.$column.push($value);
-            }
-        )* };
-    }
-    columns! {
-        BASE_COLOR base_color row.base_color.unwrap_or(Vec3::splat(0.8));
-        METALLIC metallic row.metallic.unwrap_or(0.0);
-        ROUGHNESS roughness row.roughness.unwrap_or(1.0);
-        SPECULAR specular row.specular.unwrap_or(1.0);
-        IOR ior row.ior.unwrap_or(1.5);
-        TRANSMISSION transmission row.transmission.unwrap_or(0.0);
-        OPACITY opacity row.opacity.unwrap_or(1.0);
-        EMISSION emission row.emission.unwrap_or(Vec3::ZERO);
-        NORMAL normal row.normal;
-        OCCLUSION occlusion row.occlusion.unwrap_or(1.0);
-        FEATURE feature row.feature.unwrap_or(Vec3::ZERO);
-        LINE_COLOR line_color row.line_color;
-        LINE_WIDTH line_width row.line_width;
-        PRIORITY priority row.priority;
-        COLOR color row.color;
-    }
-    for (index, column) in outputs.aovs.iter_mut().enumerate() {
-        column.push(row.aovs.get(index).copied().flatten().unwrap_or(Vec3::ZERO));
-    }
+    columns!(outputs, wanted, row, |column, value| column.push(value));
     outputs.len += 1;
+}
+
+/// Puts a row in the place of another.
+pub(super) fn replace(index: usize, row: &Row, wanted: OutputSet, outputs: &mut OutputBatch) {
+    columns!(outputs, wanted, row, |column, value| column[index] = value);
+}
+
+/// Fills the wanted columns and the extra ones up to a number of rows, with the values of keys that are left out.
+pub(super) fn fill_up(len: usize, wanted: OutputSet, outputs: &mut OutputBatch) {
+    let row = Row::default();
+    columns!(outputs, wanted, row, |column, value| column.resize(len, value));
+    outputs.len = len;
 }

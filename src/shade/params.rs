@@ -44,9 +44,27 @@ pub enum Value {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Params(pub Arc<BTreeMap<String, Value>>);
 
+/// The parameter that bounds the width of a shader's lines, in pixels, whatever `line_width` comes to: wider requests
+/// are clamped to it and counted, as those beyond the scene's `max_width` are. A script declares it where the bound
+/// cannot be seen from its text; a script may read it like any other, and a material may set it.
+pub const MAX_LINE_WIDTH: &str = "max_line_width";
+
+impl Params {
+    /// What [`MAX_LINE_WIDTH`] says, if it is declared: a number of at least 0.
+    #[must_use]
+    pub fn max_line_width(&self) -> Option<f32> {
+        #[expect(clippy::cast_precision_loss, reason = "an int counts as the nearest float")]
+        match self.0.get(MAX_LINE_WIDTH)? {
+            Value::Float(x) => Some(*x),
+            Value::Int(x) => Some(*x as f32),
+            _ => None,
+        }
+    }
+}
+
 impl Value {
     /// What the value is called in messages.
-    fn kind(&self) -> &'static str {
+    pub(super) fn kind(&self) -> &'static str {
         match self {
             Self::Unit | Self::Texture(_) => "a texture",
             Self::Bool(_) => "true or false",
@@ -62,7 +80,7 @@ impl Value {
     }
 
     /// A script's value, if parameters can be such.
-    fn from_script(value: &Dynamic) -> Option<Self> {
+    pub(super) fn from_script(value: &Dynamic) -> Option<Self> {
         if value.is_unit() {
             return Some(Self::Unit);
         }
@@ -93,6 +111,11 @@ impl Value {
         let map = value.as_map_ref().ok()?;
         let entries = map.iter().map(|(key, value)| Some((key.to_string(), Self::from_script(value)?)));
         entries.collect::<Option<_>>().map(Self::Record)
+    }
+
+    /// Whether it is of a type that attributes can have.
+    pub(super) fn can_be_attribute(&self) -> bool {
+        !matches!(self, Self::Unit | Self::Texture(_) | Self::Record(_) | Self::Array(_))
     }
 
     /// A material's value in place of this default, if it is of its type. An int may stand for a float.
@@ -160,7 +183,27 @@ pub(super) fn resolve(
             None => fault.hints.into_iter().fold(Diagnostic::error(fault.message), Diagnostic::hint),
         });
     }
+    if !faults.has_errors()
+        && let Some(value) = values.get(MAX_LINE_WIDTH)
+        && let Some(fault) = bad_bound(value)
+    {
+        // Where it was set, or else where it is declared.
+        let set = material.params.get(MAX_LINE_WIDTH).and_then(|(_, span)| span.clone());
+        let place = set.or_else(|| program.key_span(MAX_LINE_WIDTH)).unwrap_or_else(|| program.params_span());
+        faults.push(fault.at(place));
+    }
     if faults.has_errors() { Err(faults) } else { Ok(Params(Arc::new(values))) }
+}
+
+fn bad_bound(value: &Value) -> Option<Fault> {
+    let fault = match value {
+        Value::Int(x) if *x >= 0 => return None,
+        Value::Float(x) if *x >= 0.0 => return None,
+        Value::Int(x) => Fault::new(format!("`{MAX_LINE_WIDTH}` must be a number of at least 0, but it is {x}")),
+        Value::Float(x) => Fault::new(format!("`{MAX_LINE_WIDTH}` must be a number of at least 0, but it is {x}")),
+        other => Fault::new(format!("`{MAX_LINE_WIDTH}` must be a number, not {}", other.kind())),
+    };
+    Some(fault.hint("it bounds the width of this shader's lines, in pixels"))
 }
 
 fn unknown(name: &str, values: &BTreeMap<String, Value>, program: &Program) -> Fault {

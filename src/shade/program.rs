@@ -1,27 +1,45 @@
 //! Compiled scripts and the materials that use them.
 
 use std::collections::BTreeSet;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use rhai::Engine;
 
-use super::analysis::{self, Analysis};
+use super::analysis::{self, Analysis, Finding};
 use super::host::Host;
+use super::kernel::{Kernel, Surroundings};
 use super::library::ParameterRecord;
-use super::names::InputSet;
+use super::names::{InputSet, OutputSet};
+use super::native::NativeFunction;
 use super::params::{self, Params};
 use super::script::Program;
-use crate::diag::Diagnostics;
+use crate::diag::{Diagnostic, Diagnostics};
 use crate::scene::Scene;
+use crate::scene::attributes::AttributeSet;
 use crate::scene::ids::MaterialId;
+use crate::scene::texture::Texture;
 
 /// How a material's shader is run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mode {
     /// Evaluated once.
     Constant,
+    /// As a program over batches of hits.
+    Kernel,
     /// By the Rhai interpreter, at every hit.
     Interpreted,
+}
+
+/// How shaders that are not constant may be run.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ShadingMode {
+    /// As kernels where that is possible.
+    #[default]
+    Auto,
+    /// As kernels; a shader that cannot be one is an error.
+    Kernel,
+    /// By the interpreter.
+    Interpreter,
 }
 
 impl Mode {
@@ -30,6 +48,7 @@ impl Mode {
     pub fn name(self) -> &'static str {
         match self {
             Self::Constant => "constant",
+            Self::Kernel => "kernel",
             Self::Interpreted => "interpreted",
         }
     }
@@ -43,6 +62,15 @@ pub struct Shader {
     params: Params,
     pub(super) program: Arc<Program>,
     pub(super) record: ParameterRecord,
+    /// The kernel, or why there is none; `None` if the interpreter was asked for.
+    kernel: Option<Result<Arc<Kernel>, Finding>>,
+    /// Kernels for batches with another number of lights than the scene has.
+    other_kernels: Mutex<Vec<(usize, Option<Arc<Kernel>>)>>,
+    material_id: u32,
+    light_count: usize,
+    textures: Arc<[Arc<Texture>]>,
+    natives: Arc<[NativeFunction]>,
+    pub(super) attributes: Arc<Vec<AttributeSet>>,
 }
 
 impl Shader {
@@ -73,13 +101,71 @@ impl Shader {
     /// How it is run.
     #[must_use]
     pub fn mode(&self) -> Mode {
-        if self.analysis.is_constant() { Mode::Constant } else { Mode::Interpreted }
+        match self.kernel {
+            _ if self.analysis.is_constant() => Mode::Constant,
+            Some(Ok(_)) => Mode::Kernel,
+            _ => Mode::Interpreted,
+        }
     }
 
-    /// The columns of a [`HitBatch`](super::HitBatch) that must be filled for it.
+    /// The construct that keeps the shader from being a kernel.
     #[must_use]
-    pub fn needs(&self) -> InputSet {
-        if self.analysis.complete { self.analysis.inputs.columns() } else { InputSet::all() }
+    pub fn blame(&self) -> Option<&Finding> {
+        self.kernel.as_ref()?.as_ref().err()
+    }
+
+    /// The blame as a diagnostic, at its place.
+    #[must_use]
+    pub fn blame_diagnostic(&self) -> Option<Diagnostic> {
+        self.blame().map(|blame| self.program.found(blame))
+    }
+
+    /// The columns of a [`HitBatch`](super::HitBatch) that must be filled for it when these outputs are asked for. The
+    /// interpreter evaluates all outputs, whatever is asked for.
+    #[must_use]
+    pub fn needs(&self, wanted: OutputSet) -> InputSet {
+        let all = if self.analysis.complete { self.analysis.inputs.columns() } else { InputSet::all() };
+        match &self.kernel {
+            Some(Ok(kernel)) if self.mode() == Mode::Kernel => {
+                let slice = kernel.slice(wanted);
+                // Hits that fail are given to the interpreter.
+                if slice.may_fail { all } else { slice.inputs.columns() }
+            }
+            _ => all,
+        }
+    }
+
+    /// The kernel for batches with so many lights.
+    pub(super) fn kernel(&self, light_count: usize) -> Option<Arc<Kernel>> {
+        let kernel = self.kernel.as_ref()?.as_ref().ok()?;
+        if light_count == self.light_count || !self.analysis.inputs.intersects(InputSet::LIGHT_COUNT | InputSet::LIGHT)
+        {
+            return Some(Arc::clone(kernel));
+        }
+        let mut others = self.other_kernels.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, kernel)) = others.iter().find(|(count, _)| *count == light_count) {
+            return kernel.clone();
+        }
+        let kernel = self.lower(light_count).ok();
+        others.push((light_count, kernel.clone()));
+        kernel
+    }
+
+    fn lower(&self, light_count: usize) -> Result<Arc<Kernel>, Finding> {
+        let surroundings = Surroundings {
+            textures: &self.textures,
+            attributes: &self.attributes,
+            natives: &self.natives,
+            material_id: self.material_id,
+            light_count: Some(light_count),
+        };
+        Kernel::new(&self.program, &self.params, surroundings).map(Arc::new)
+    }
+
+    /// The program of its kernel for all outputs, if it has one: for people, and for golden texts.
+    #[must_use]
+    pub fn listing(&self) -> Option<String> {
+        self.kernel.as_ref()?.as_ref().ok().map(|kernel| kernel.listing())
     }
 }
 
@@ -91,36 +177,50 @@ pub struct Shaders {
     host: Host,
     /// Every name that some script's `params()` has.
     parameters: BTreeSet<String>,
+    /// The scene's, for scripts that name images.
+    textures: Vec<Arc<Texture>>,
 }
 
 impl Shaders {
     /// Compiles and analyses all scripts of a scene. Warnings come beside the value.
     ///
     /// # Errors
-    /// Every syntax error, missing `surface`, fault in `params()`, unknown or ill-typed parameter, and what the analysis
+    /// What the host could not register; every syntax error, missing `surface`, fault in `params()`, unknown or ill-typed parameter, and what the analysis
     /// finds to be certainly wrong (unknown inputs, outputs and parameters in code that may run), at its place.
     pub fn compile(scene: &Scene, host: &Host) -> Result<(Self, Diagnostics), Diagnostics> {
-        let engine = host.engine(&BTreeSet::new());
-        let mut faults = Diagnostics::default();
+        Self::compile_for(scene, host, ShadingMode::Auto)
+    }
+
+    /// The same, with a say in how shaders are run.
+    ///
+    /// # Errors
+    /// As [`compile`](Self::compile); and with [`ShadingMode::Kernel`], every construct that cannot be part of a kernel.
+    pub fn compile_for(scene: &Scene, host: &Host, mode: ShadingMode) -> Result<(Self, Diagnostics), Diagnostics> {
+        let engine = host.engine(&BTreeSet::new(), scene.textures());
+        let mut faults = host.check().err().unwrap_or_default();
         let mut keep = |result: Result<_, Diagnostics>| result.map_err(|found| faults.extend(found)).ok();
 
         let scripts: Vec<_> = scene
             .scripts()
             .iter()
             .map(|script| {
-                keep(Program::parse(&engine, &script.source).and_then(|program| {
+                keep(Program::parse(&script.source, scene.script_files()).and_then(|program| {
                     let defaults = params::defaults(&program, &program.defaults(&engine)?)?;
                     Ok((Arc::new(program), defaults))
                 }))
             })
             .collect();
 
+        let textures: Arc<[Arc<Texture>]> = scene.textures().into();
+        let natives: Arc<[NativeFunction]> = host.natives().cloned().collect();
         let mut shaders = Vec::new();
-        for material in scene.materials() {
+        for (index, material) in scene.materials().iter().enumerate() {
+            let sets = scene.attributes().of_material(MaterialId::from_index(index));
+            let attributes: Vec<_> = sets.keys().map(|set| &scene.attributes().sets()[*set as usize]).collect();
             let Some((program, defaults)) = &scripts[material.script.index()] else { continue };
             match params::resolve(defaults.clone(), material, program) {
                 Ok(params) => {
-                    let analysis = analysis::analyse(&program.ast, &params, scene.textures());
+                    let analysis = analysis::analyse_program(program, &params, scene.textures(), &attributes);
                     for finding in &analysis.findings {
                         let fault = program.found(finding);
                         // Materials that share a script share its faults.
@@ -128,13 +228,29 @@ impl Shaders {
                             faults.push(fault);
                         }
                     }
-                    shaders.push(Shader {
+                    let mut shader = Shader {
                         name: material.name.clone(),
                         analysis,
                         record: ParameterRecord::new(&params, scene.textures()),
                         params,
                         program: Arc::clone(program),
-                    });
+                        kernel: None,
+                        other_kernels: Mutex::default(),
+                        material_id: MaterialId::from_index(index).0 + 1,
+                        light_count: scene.lights().len(),
+                        textures: Arc::clone(&textures),
+                        natives: Arc::clone(&natives),
+                        attributes: Arc::clone(scene.attributes().sets()),
+                    };
+                    if mode != ShadingMode::Interpreter && !shader.analysis.is_constant() {
+                        shader.kernel = Some(shader.lower(shader.light_count));
+                        if let (ShadingMode::Kernel, Some(fault)) = (mode, shader.blame_diagnostic())
+                            && !faults.0.contains(&fault)
+                        {
+                            faults.push(fault);
+                        }
+                    }
+                    shaders.push(shader);
                 }
                 Err(found) => faults.extend(found),
             }
@@ -144,7 +260,8 @@ impl Shaders {
         }
         let parameters = scripts.iter().flatten().flat_map(|(_, defaults)| defaults.keys().cloned()).collect();
         let aovs = extra_outputs(&shaders);
-        Ok((Self { shaders, aovs, host: host.clone(), parameters }, faults))
+        let textures = scene.textures().to_vec();
+        Ok((Self { shaders, aovs, host: host.clone(), parameters, textures }, faults))
     }
 
     /// All shaders, in the order of the materials.
@@ -172,7 +289,7 @@ impl Shaders {
 
     /// An engine for one thread: an engine shared by two would make them wait for each other.
     pub(super) fn engine(&self) -> Engine {
-        self.host.engine(&self.parameters)
+        self.host.engine(&self.parameters, &self.textures)
     }
 }
 

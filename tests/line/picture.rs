@@ -7,7 +7,7 @@ use tusche::scene::settings::LineSettings;
 
 /// Everything a buffer can keep.
 pub fn layout(samples_per_pixel: u32, max_width: f32) -> SampleLayout {
-    SampleLayout { samples_per_pixel, columns: NodeColumnSet::ALL, position: false, aovs: 0, max_width, materials: 8 }
+    SampleLayout { samples_per_pixel, columns: NodeColumnSet::ALL, max_width, materials: 8, ..SampleLayout::default() }
 }
 
 /// The samples of a rectangle of a picture; `node` gives what the camera sees at a point of the film, in pixels.

@@ -23,6 +23,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::SceneBuilder;
+use super::ids::MaterialId;
 use crate::diag::{Diagnostic, Diagnostics, Source};
 use crate::files::FileStore;
 
@@ -63,7 +64,43 @@ pub fn load(
             return Err(fault.hint("scene files end in .toml, models in .gltf or .glb").into());
         }
     };
-    let mut document = document::parse(&source)?;
+    let is_written = extension.as_deref() == Some("toml");
+    load_document(&source, path, files, overrides, options, is_written)
+}
+
+/// Reads a bare shader as a scene: a ball and a knot of it on a stage, which `tusche shader preview` shows. The path may
+/// be `builtin:` and a name. `params` are `NAME=VALUE`, values for the shader's parameters; paths in them are relative to
+/// the working directory. Gives the material that has the shader, too.
+///
+/// # Errors
+/// As [`load`].
+pub fn load_shader(
+    path: &Path,
+    files: &FileStore,
+    params: &[Override],
+) -> Result<(SceneBuilder, MaterialId, Diagnostics), Diagnostics> {
+    let is_builtin = path.to_str().is_some_and(|path| path.starts_with(resolve::BUILTIN));
+    if !is_builtin {
+        files.read_text(path)?;
+    }
+    let (name, source) = shader_scene(path, is_builtin)?;
+    let overrides: Vec<_> = params.iter().map(|param| param.clone().within(&["materials", &name, "params"])).collect();
+    let (builder, warnings) = load_document(&source, path, files, &overrides, &LoadOptions::default(), false)?;
+    let material = builder.materials.iter().position(|material| material.name == name);
+    let material = material.ok_or_else(|| Diagnostic::error("the stage has lost its shader").in_file(path))?;
+    Ok((builder, MaterialId::from_index(material), warnings))
+}
+
+/// Loads a scene from its text. `is_written` tells whether a user wrote that.
+fn load_document(
+    source: &Arc<Source>,
+    path: &Path,
+    files: &FileStore,
+    overrides: &[Override],
+    options: &LoadOptions,
+    is_written: bool,
+) -> Result<(SceneBuilder, Diagnostics), Diagnostics> {
+    let mut document = document::parse(source)?;
     let mut faults = Diagnostics::default();
     let schema = schema();
     for change in overrides {
@@ -75,17 +112,18 @@ pub fn load(
         std::mem::take(&mut faults)
     })?;
     let folder = path.parent().unwrap_or(Path::new(""));
-    let context = resolve::Context { files, options, source: &source, folder };
+    let context = resolve::Context { files, options, source, folder };
     let builder = resolve::resolve(&written, &document, context, &mut faults);
-    let sources: Vec<_> = std::iter::once(&source).chain(overrides.iter().map(Override::source)).collect();
+    let sources: Vec<_> = std::iter::once(source).chain(overrides.iter().map(Override::source)).collect();
     faults.0.sort_by_key(|fault| {
         let span = fault.span.as_ref();
         let file = span.and_then(|span| sources.iter().position(|source| Arc::ptr_eq(source, &span.source)));
         (file.unwrap_or(sources.len()), span.map_or(0, |span| span.range.start))
     });
-    if extension.as_deref() != Some("toml") {
-        // Nobody wrote the text that stands for a bare model; its messages name the model.
-        for fault in faults.0.iter_mut().filter(|fault| fault.span.as_ref().is_some_and(|span| span.source == source)) {
+    if !is_written {
+        // Nobody wrote the text that stands for a bare model or shader; its messages name that.
+        for fault in faults.0.iter_mut().filter(|fault| fault.span.as_ref().is_some_and(|span| span.source == *source))
+        {
             fault.span = None;
         }
     }
@@ -94,10 +132,7 @@ pub fn load(
 
 /// The scene file that a bare model stands for: what a scene file leaves out is framed and lit, and creases draw lines.
 fn model_scene(path: &Path) -> Result<Arc<Source>, Diagnostic> {
-    let bad_name = || Diagnostic::error("the name of this file is not valid text").in_file(path);
-    let file = path.file_name().and_then(|name| name.to_str()).ok_or_else(bad_name)?;
-    let name = path.file_stem().and_then(|name| name.to_str()).ok_or_else(bad_name)?;
-    let quote = |text: &str| serde_json::Value::from(text).to_string();
+    let (file, name) = names(path)?;
     let text = format!(
         "[render]\nbackground = {{ bottom = [0.83, 0.83, 0.82], top = [0.96, 0.96, 0.97] }}\n\
          [lines]\nnormal = 50.0\n\
@@ -106,4 +141,29 @@ fn model_scene(path: &Path) -> Result<Arc<Source>, Diagnostic> {
         quote(file)
     );
     Ok(Source::new(format!("<scene of {}>", path.display()), text))
+}
+
+/// The scene file that a bare shader stands for, and the name of the material that has the shader.
+fn shader_scene(path: &Path, is_builtin: bool) -> Result<(String, Arc<Source>), Diagnostic> {
+    let (file, stem) = names(path)?;
+    let name = if is_builtin { file.strip_prefix(resolve::BUILTIN).unwrap_or(file) } else { stem };
+    let text = format!(
+        "{}\n[materials.{}]\nshader = {}\n",
+        include_str!("stage.toml").replace("SHADER", &quote(name)),
+        quote(name),
+        quote(file)
+    );
+    Ok((name.to_owned(), Source::new(format!("<scene of {}>", path.display()), text)))
+}
+
+/// The name of a file, with and without its extension.
+fn names(path: &Path) -> Result<(&str, &str), Diagnostic> {
+    let bad_name = || Diagnostic::error("the name of this file is not valid text").in_file(path);
+    let file = path.file_name().and_then(|name| name.to_str()).ok_or_else(bad_name)?;
+    let name = path.file_stem().and_then(|name| name.to_str()).ok_or_else(bad_name)?;
+    Ok((file, name))
+}
+
+fn quote(text: &str) -> String {
+    serde_json::Value::from(text).to_string()
 }

@@ -55,6 +55,13 @@ impl Override {
         Ok(Self { source, path, value })
     }
 
+    /// The same value, for a path that begins with these parts.
+    pub(super) fn within(mut self, parts: &[&str]) -> Self {
+        let whole = Span::new(&self.source, 0..self.source.text.len());
+        self.path.splice(0..0, parts.iter().map(|part| ((*part).to_owned(), whole.clone())));
+        self
+    }
+
     /// What was typed, which places in messages point into.
     pub(super) fn source(&self) -> &Arc<Source> {
         &self.source

@@ -7,10 +7,10 @@ use rhai::{ASTFlags, Expr, FnCallExpr, OpAssignment, Position};
 use super::functions;
 use super::inputs;
 use super::interval::Interval;
+use super::nearest_hint;
 use super::operators;
 use super::value::{Abstract, Field, Record, Shape, Vector};
-use super::walk::{Flow, Stop, Walker, place};
-use super::{Finding, nearest_hint};
+use super::walk::{Flow, Stop, Walker};
 use crate::shade::names::InputSet;
 
 /// One link of a chain.
@@ -219,6 +219,9 @@ impl Walker<'_> {
         position: Position,
     ) -> Flow<(Abstract, Option<Abstract>)> {
         let name = call.name.as_str();
+        if let (Shape::Closure(closure), "call") = (&target.shape, name) {
+            return self.closure_call(&Rc::clone(closure), arguments, position).map(|value| (value, None));
+        }
         if super::expressions::BEYOND.contains(&name) {
             return self.give_up(position, &format!("`{name}`"));
         }
@@ -261,6 +264,9 @@ impl Walker<'_> {
     }
 
     fn key(&mut self, record: &Record, name: &str, position: Position) -> Abstract {
+        if record.is_params {
+            self.parameters.insert(name.into());
+        }
         match record.fields.get(name) {
             Some(field) if field.always => field.value.clone(),
             Some(field) => {
@@ -271,9 +277,8 @@ impl Walker<'_> {
                 if record.is_params {
                     let message = format!("there is no parameter `{name}`");
                     if record.fields.is_empty() {
-                        let place = place(position);
                         let hint = Some(format!("declare it: fn params() {{ #{{ {name}: 1.0 }} }}"));
-                        self.findings.insert(Finding { place, message, hint });
+                        self.find_fault(position, message, hint);
                     } else {
                         self.unknown_name(message, name, record.fields.keys().map(|key| &**key), position);
                     }
@@ -291,7 +296,7 @@ impl Walker<'_> {
         position: Position,
     ) {
         let hint = nearest_hint(name, candidates);
-        self.findings.insert(Finding { place: place(position), message, hint });
+        self.find_fault(position, message, hint);
     }
 
     fn with_property(&mut self, target: &Abstract, name: &str, item: Abstract, position: Position) -> Flow<Abstract> {
@@ -299,7 +304,7 @@ impl Walker<'_> {
             Shape::Hit => self.give_up(position, "an assignment to `hit`"),
             Shape::Record(record) => {
                 let mut record = Record::clone(record);
-                record.fields.insert(name.into(), Field::always(item, place(position)));
+                record.fields.insert(name.into(), Field::always(item, self.place(position)));
                 Ok(self.constant(Shape::Record(Rc::new(record))))
             }
             Shape::Vector(vector) => match swizzle(name, vector.channels.len()) {

@@ -7,11 +7,24 @@ use super::operand::{Operand, Outcome, refuse};
 use crate::math::Vec3;
 
 pub(super) const FUNCTIONS: &[Function] = &[
-    Function { name: "hash", form: "hash(x)", about: "a number 0 ≤ h < 1 that looks random, of a number or vector" },
-    Function { name: "hash_color", form: "hash_color(x)", about: "the same, three unrelated numbers in a vec3" },
+    Function {
+        name: "hash",
+        form: "hash(x)",
+        about: "a number 0 ≤ h < 1 that looks random, of a number or vector",
+        types: "number or vector → number, 0 ≤ h < 1",
+        example: "hash(hit.object_id)",
+    },
+    Function {
+        name: "hash_color",
+        form: "hash_color(x)",
+        about: "the same, three unrelated numbers in a vec3",
+        types: "number or vector → vec3, 0 ≤ h < 1",
+        example: "hash_color(hit.polygon_id)",
+    },
 ];
 
 /// An integer hash with good avalanche: C. Wellons' `lowbias32`.
+#[inline(always)]
 fn scramble(mut x: u32) -> u32 {
     x ^= x >> 16;
     x = x.wrapping_mul(0x7feb_352d);
@@ -20,19 +33,42 @@ fn scramble(mut x: u32) -> u32 {
     x ^ (x >> 16)
 }
 
+/// The hash of an int from a seed.
+#[inline(always)]
+pub(in crate::shade) fn of_int(seed: u32, x: i64) -> f32 {
+    unit(digest(seed, Operand::Int(x)))
+}
+
+/// The hash of a number's or vector's components from a seed.
+#[inline(always)]
+pub(in crate::shade) fn of_floats(seed: u32, components: &[f32]) -> f32 {
+    unit(components.iter().fold(seed, |h, x| join(h, float_word(*x))))
+}
+
+#[inline(always)]
+fn join(h: u32, word: u32) -> u32 {
+    scramble(h ^ word).wrapping_add(0x9e37_79b9)
+}
+
+/// −0 counts as 0, and every NaN as one: which of its many bit patterns an operation gives is up to the machine.
+#[inline(always)]
+fn float_word(x: f32) -> u32 {
+    if x.is_nan() { f32::NAN.to_bits() } else { (x + 0.0).to_bits() }
+}
+
 /// From a seed, for each word in order, `h = scramble(h ^ word) + 0x9e3779b9`. The words of an int are its low and high
-/// 32 bits; of floats, the bits of each component, −0 counting as 0. So 1 and 1.0 differ.
+/// 32 bits; of floats, the bits of each component, −0 counting as 0 and all NaNs as one. So 1 and 1.0 differ.
 fn digest(seed: u32, value: Operand) -> u32 {
-    let join = |h: u32, word: u32| scramble(h ^ word).wrapping_add(0x9e37_79b9);
     match value {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the halves are taken as bits")]
         Operand::Int(x) => join(join(seed, x as u32), (x >> 32) as u32),
-        _ => (0..value.width()).fold(seed, |h, lane| join(h, (value.lane(lane) + 0.0).to_bits())),
+        _ => (0..value.width()).fold(seed, |h, lane| join(h, float_word(value.lane(lane)))),
     }
 }
 
 /// The upper 24 bits as a fraction, each value exact.
 #[expect(clippy::cast_precision_loss, reason = "24 bits fit a float")]
+#[inline(always)]
 fn unit(h: u32) -> f32 {
     (scramble(h) >> 8) as f32 / 16_777_216.0
 }

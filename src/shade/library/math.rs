@@ -14,89 +14,316 @@ use crate::math::portable;
 use crate::shade::fault::Fault;
 
 pub(super) const FUNCTIONS: &[Function] = &[
-    Function { name: "mix", form: "mix(a, b, t)", about: "a·(1 − t) + b·t" },
-    Function { name: "clamp", form: "clamp(x, low, high)", about: "min(max(x, low), high)" },
-    Function { name: "saturate", form: "saturate(x)", about: "x within 0 … 1" },
-    Function { name: "step", form: "step(edge, x)", about: "0 where x < edge, else 1" },
+    Function {
+        name: "mix",
+        form: "mix(a, b, t)",
+        about: "a·(1 − t) + b·t",
+        types: "numbers or vectors → the same",
+        example: "mix(rgb(1, 0, 0), rgb(0, 0, 1), 0.25)",
+    },
+    Function {
+        name: "clamp",
+        form: "clamp(x, low, high)",
+        about: "min(max(x, low), high)",
+        types: "numbers or vectors → the same",
+        example: "clamp(hit.curvature, -1.0, 1.0)",
+    },
+    Function {
+        name: "saturate",
+        form: "saturate(x)",
+        about: "x within 0 … 1",
+        types: "number or vector → the same, 0 … 1",
+        example: "saturate(luminance(hit.irradiance))",
+    },
+    Function {
+        name: "step",
+        form: "step(edge, x)",
+        about: "0 where x < edge, else 1",
+        types: "numbers or vectors → the same, 0 or 1",
+        example: "step(0.5, hit.uv.x)",
+    },
     Function {
         name: "smoothstep",
         form: "smoothstep(low, high, x)",
         about: "0 below low, 1 above high, t·t·(3 − 2·t) between",
+        types: "numbers or vectors → the same, 0 … 1",
+        example: "smoothstep(0.2, 0.8, hit.uv.y)",
     },
     Function {
         name: "remap",
         form: "remap(x, from_low, from_high, to_low, to_high)",
         about: "x carried over linearly from one range to another, beyond the ends too",
+        types: "numbers or vectors → the same",
+        example: "remap(hit.depth, 1.0, 10.0, 4.0, 1.0)",
     },
-    Function { name: "min", form: "min(a, b)", about: "b where b < a, else a" },
-    Function { name: "max", form: "max(a, b)", about: "b where a < b, else a" },
-    Function { name: "abs", form: "abs(x)", about: "x without its sign" },
-    Function { name: "sign", form: "sign(x)", about: "−1, 0 or 1" },
-    Function { name: "floor", form: "floor(x)", about: "the next whole number downwards, as a float" },
-    Function { name: "ceil", form: "ceil(x)", about: "the next whole number upwards, as a float" },
-    Function { name: "round", form: "round(x)", about: "the nearest whole number, halves away from 0, as a float" },
-    Function { name: "fract", form: "fract(x)", about: "x − floor(x)" },
-    Function { name: "mod", form: "mod(x, y)", about: "x − y·floor(x / y): has the sign of y, unlike x % y" },
-    Function { name: "sqrt", form: "sqrt(x)", about: "square root" },
-    Function { name: "pow", form: "pow(x, y)", about: "x to the power y, as a float" },
-    Function { name: "exp", form: "exp(x)", about: "e to the power x" },
-    Function { name: "exp2", form: "exp2(x)", about: "2 to the power x" },
-    Function { name: "ln", form: "ln(x)", about: "natural logarithm" },
-    Function { name: "log", form: "log(x)", about: "logarithm to base 10" },
-    Function { name: "log", form: "log(x, base)", about: "ln(x) / ln(base)" },
-    Function { name: "log2", form: "log2(x)", about: "logarithm to base 2" },
-    Function { name: "sin", form: "sin(radians)", about: "sine" },
-    Function { name: "cos", form: "cos(radians)", about: "cosine" },
-    Function { name: "tan", form: "tan(radians)", about: "tangent" },
-    Function { name: "asin", form: "asin(x)", about: "angle of a sine, in radians" },
-    Function { name: "acos", form: "acos(x)", about: "angle of a cosine, in radians" },
-    Function { name: "atan", form: "atan(x)", about: "angle of a tangent, in radians" },
-    Function { name: "atan", form: "atan(y, x)", about: "angle of the direction (x, y), −π … π" },
-    Function { name: "sinh", form: "sinh(x)", about: "hyperbolic sine" },
-    Function { name: "cosh", form: "cosh(x)", about: "hyperbolic cosine" },
-    Function { name: "tanh", form: "tanh(x)", about: "hyperbolic tangent" },
-    Function { name: "radians", form: "radians(degrees)", about: "degrees · (π / 180)" },
-    Function { name: "degrees", form: "degrees(radians)", about: "radians · (180 / π)" },
-    Function { name: "is_nan", form: "is_nan(x)", about: "whether a float is no number" },
-    Function { name: "to_int", form: "to_int(x)", about: "the whole part of a number, as an int" },
-    Function { name: "to_float", form: "to_float(x)", about: "the nearest float of an int" },
+    Function {
+        name: "min",
+        form: "min(a, b)",
+        about: "b where b < a, else a",
+        types: "numbers or vectors → the same",
+        example: "min(hit.uv.x, hit.uv.y)",
+    },
+    Function {
+        name: "max",
+        form: "max(a, b)",
+        about: "b where a < b, else a",
+        types: "numbers or vectors → the same",
+        example: "max(0.0, dot(hit.normal, -hit.incoming))",
+    },
+    Function {
+        name: "abs",
+        form: "abs(x)",
+        about: "x without its sign",
+        types: "number or vector → the same, 0 or more",
+        example: "abs(hit.normal)",
+    },
+    Function {
+        name: "sign",
+        form: "sign(x)",
+        about: "−1, 0 or 1",
+        types: "number or vector → the same, −1, 0 or 1",
+        example: "sign(hit.curvature)",
+    },
+    Function {
+        name: "floor",
+        form: "floor(x)",
+        about: "the next whole number downwards, as a float",
+        types: "number or vector → float or vector",
+        example: "floor(hit.uv.x * 8.0)",
+    },
+    Function {
+        name: "ceil",
+        form: "ceil(x)",
+        about: "the next whole number upwards, as a float",
+        types: "number or vector → float or vector",
+        example: "ceil(hit.uv.x * 8.0)",
+    },
+    Function {
+        name: "round",
+        form: "round(x)",
+        about: "the nearest whole number, halves away from 0, as a float",
+        types: "number or vector → float or vector",
+        example: "round(hit.depth)",
+    },
+    Function {
+        name: "fract",
+        form: "fract(x)",
+        about: "x − floor(x)",
+        types: "number or vector → float or vector, 0 … 1",
+        example: "fract(hit.uv.x * 8.0)",
+    },
+    Function {
+        name: "mod",
+        form: "mod(x, y)",
+        about: "x − y·floor(x / y): has the sign of y, unlike x % y",
+        types: "numbers or vectors → the same",
+        example: "mod(hit.position.x, 2.0)",
+    },
+    Function {
+        name: "sqrt",
+        form: "sqrt(x)",
+        about: "square root",
+        types: "number or vector → float or vector; NaN below 0",
+        example: "sqrt(2.0)",
+    },
+    Function {
+        name: "pow",
+        form: "pow(x, y)",
+        about: "x to the power y, as a float",
+        types: "numbers or vectors → float or vector",
+        example: "pow(hit.uv.x, 2.2)",
+    },
+    Function {
+        name: "exp",
+        form: "exp(x)",
+        about: "e to the power x",
+        types: "number or vector → float or vector, 0 or more",
+        example: "exp(-hit.distance)",
+    },
+    Function {
+        name: "exp2",
+        form: "exp2(x)",
+        about: "2 to the power x",
+        types: "number or vector → float or vector, 0 or more",
+        example: "exp2(3.0)",
+    },
+    Function {
+        name: "ln",
+        form: "ln(x)",
+        about: "natural logarithm",
+        types: "number or vector → float or vector; NaN below 0",
+        example: "ln(2.0)",
+    },
+    Function {
+        name: "log",
+        form: "log(x)",
+        about: "logarithm to base 10",
+        types: "number or vector → float or vector; NaN below 0",
+        example: "log(1000.0)",
+    },
+    Function {
+        name: "log",
+        form: "log(x, base)",
+        about: "ln(x) / ln(base)",
+        types: "numbers or vectors → float or vector",
+        example: "log(8.0, 2.0)",
+    },
+    Function {
+        name: "log2",
+        form: "log2(x)",
+        about: "logarithm to base 2",
+        types: "number or vector → float or vector; NaN below 0",
+        example: "log2(8.0)",
+    },
+    Function {
+        name: "sin",
+        form: "sin(radians)",
+        about: "sine",
+        types: "number or vector → float or vector, −1 … 1",
+        example: "sin(hit.uv.x * TAU)",
+    },
+    Function {
+        name: "cos",
+        form: "cos(radians)",
+        about: "cosine",
+        types: "number or vector → float or vector, −1 … 1",
+        example: "cos(hit.uv.x * TAU)",
+    },
+    Function {
+        name: "tan",
+        form: "tan(radians)",
+        about: "tangent",
+        types: "number or vector → float or vector",
+        example: "tan(PI / 4.0)",
+    },
+    Function {
+        name: "asin",
+        form: "asin(x)",
+        about: "angle of a sine, in radians",
+        types: "number or vector, −1 … 1 → float or vector, −π/2 … π/2",
+        example: "asin(0.5)",
+    },
+    Function {
+        name: "acos",
+        form: "acos(x)",
+        about: "angle of a cosine, in radians",
+        types: "number or vector, −1 … 1 → float or vector, 0 … π",
+        example: "acos(hit.normal.z * 0.99)",
+    },
+    Function {
+        name: "atan",
+        form: "atan(x)",
+        about: "angle of a tangent, in radians",
+        types: "number or vector → float or vector, −π/2 … π/2",
+        example: "atan(1.0)",
+    },
+    Function {
+        name: "atan",
+        form: "atan(y, x)",
+        about: "angle of the direction (x, y), −π … π",
+        types: "numbers or vectors → float or vector, −π … π",
+        example: "atan(hit.normal.z, hit.normal.x)",
+    },
+    Function {
+        name: "sinh",
+        form: "sinh(x)",
+        about: "hyperbolic sine",
+        types: "number or vector → float or vector",
+        example: "sinh(1.0)",
+    },
+    Function {
+        name: "cosh",
+        form: "cosh(x)",
+        about: "hyperbolic cosine",
+        types: "number or vector → float or vector, 1 or more",
+        example: "cosh(1.0)",
+    },
+    Function {
+        name: "tanh",
+        form: "tanh(x)",
+        about: "hyperbolic tangent",
+        types: "number or vector → float or vector, −1 … 1",
+        example: "tanh(hit.curvature)",
+    },
+    Function {
+        name: "radians",
+        form: "radians(degrees)",
+        about: "degrees · (π / 180)",
+        types: "number or vector → float or vector",
+        example: "radians(45)",
+    },
+    Function {
+        name: "degrees",
+        form: "degrees(radians)",
+        about: "radians · (180 / π)",
+        types: "number or vector → float or vector",
+        example: "degrees(PI)",
+    },
+    Function {
+        name: "is_nan",
+        form: "is_nan(x)",
+        about: "whether a float is no number",
+        types: "float → true or false",
+        example: "is_nan(sqrt(-1.0))",
+    },
+    Function {
+        name: "to_int",
+        form: "to_int(x)",
+        about: "the whole part of a number, as an int",
+        types: "number → int",
+        example: "to_int(hit.uv.x * 8.0)",
+    },
+    Function {
+        name: "to_float",
+        form: "to_float(x)",
+        about: "the nearest float of an int",
+        types: "number → float",
+        example: "to_float(hit.object_id)",
+    },
 ];
 
 /// Words that stand for numbers.
 pub(in crate::shade) const CONSTANTS: [(&str, f32); 2] = [("PI", PI), ("TAU", TAU)];
 
 /// `b` where `b < a`, else `a`: a NaN in `a` stays.
-pub(super) fn min(a: f32, b: f32) -> f32 {
+#[inline(always)]
+pub(in crate::shade) fn min(a: f32, b: f32) -> f32 {
     if b < a { b } else { a }
 }
 
 /// `b` where `a < b`, else `a`: a NaN in `a` stays.
-pub(super) fn max(a: f32, b: f32) -> f32 {
+#[inline(always)]
+pub(in crate::shade) fn max(a: f32, b: f32) -> f32 {
     if a < b { b } else { a }
 }
 
 /// `min(max(x, low), high)`.
-pub(super) fn clamp(x: f32, low: f32, high: f32) -> f32 {
+#[inline(always)]
+pub(in crate::shade) fn clamp(x: f32, low: f32, high: f32) -> f32 {
     min(max(x, low), high)
 }
 
 /// `clamp(x, 0, 1)`.
-pub(super) fn saturate(x: f32) -> f32 {
+#[inline(always)]
+pub(in crate::shade) fn saturate(x: f32) -> f32 {
     clamp(x, 0.0, 1.0)
 }
 
 /// `a * (1 - t) + b * t`: exactly `a` at 0 and `b` at 1.
-pub(super) fn mix(a: f32, b: f32, t: f32) -> f32 {
+#[inline(always)]
+pub(in crate::shade) fn mix(a: f32, b: f32, t: f32) -> f32 {
     a * (1.0 - t) + b * t
 }
 
 /// 0 where `x < edge`, else 1.
-pub(super) fn step(edge: f32, x: f32) -> f32 {
+#[inline(always)]
+pub(in crate::shade) fn step(edge: f32, x: f32) -> f32 {
     if x < edge { 0.0 } else { 1.0 }
 }
 
 /// With `t = saturate((x - low) / (high - low))`: `t * t * (3 - 2 * t)`. With `low = high` it is `step(low, x)`.
-pub(super) fn smoothstep(low: f32, high: f32, x: f32) -> f32 {
+#[inline(always)]
+pub(in crate::shade) fn smoothstep(low: f32, high: f32, x: f32) -> f32 {
     if low == high {
         return step(low, x);
     }
@@ -110,7 +337,8 @@ pub(super) fn remap(x: f32, from_low: f32, from_high: f32, to_low: f32, to_high:
 }
 
 /// -1, 0 or 1; a NaN stays.
-pub(super) fn sign(x: f32) -> f32 {
+#[inline(always)]
+pub(in crate::shade) fn sign(x: f32) -> f32 {
     if x > 0.0 {
         1.0
     } else if x < 0.0 {
@@ -121,13 +349,31 @@ pub(super) fn sign(x: f32) -> f32 {
 }
 
 /// `x - floor(x)`.
-pub(super) fn fract(x: f32) -> f32 {
+#[inline(always)]
+pub(in crate::shade) fn fract(x: f32) -> f32 {
     x - x.floor()
 }
 
 /// `x - y * floor(x / y)`.
-pub(super) fn floored_mod(x: f32, y: f32) -> f32 {
+#[inline(always)]
+pub(in crate::shade) fn floored_mod(x: f32, y: f32) -> f32 {
     x - y * (x / y).floor()
+}
+
+/// `x - y * floor(x / y)` in whole numbers; `None` where that has no value.
+#[inline(always)]
+pub(in crate::shade) fn floored_mod_ints(x: i64, y: i64) -> Option<i64> {
+    let rest = x.checked_rem(y)?;
+    Some(if rest != 0 && (rest < 0) != (y < 0) { rest + y } else { rest })
+}
+
+/// The whole part; `None` where that does not fit an int.
+#[inline(always)]
+pub(in crate::shade) fn to_int(x: f32) -> Option<i64> {
+    // 2⁶³ as a float; every float below it fits.
+    const END: f32 = 9_223_372_036_854_775_808.0;
+    #[expect(clippy::cast_possible_truncation, reason = "checked to fit")]
+    (-END..END).contains(&x).then_some(x as i64)
 }
 
 /// `ln(x) / ln(base)`.
@@ -187,8 +433,7 @@ fn register_ints(engine: &mut Engine) {
         x.checked_abs().ok_or_else(|| Fault::new(format!("abs({x}) does not fit an int")).into())
     });
     engine.register_fn("mod", |x: i64, y: i64| -> Outcome<i64> {
-        let rest = x.checked_rem(y).ok_or_else(|| Fault::new(format!("mod({x}, {y}) has no value")))?;
-        Ok(if rest != 0 && (rest < 0) != (y < 0) { rest + y } else { rest })
+        floored_mod_ints(x, y).ok_or_else(|| Fault::new(format!("mod({x}, {y}) has no value")).into())
     });
 }
 
@@ -200,13 +445,11 @@ fn register_conversions(engine: &mut Engine) {
         _ => Err(refuse("to_float", &[x])),
     });
     engine.register_fn("to_int", |x: Dynamic| -> Outcome<i64> {
-        // 2⁶³ as a float; every float below it fits.
-        const END: f32 = 9_223_372_036_854_775_808.0;
         match Operand::of(&x) {
             Some(Operand::Int(i)) => Ok(i),
-            #[expect(clippy::cast_possible_truncation, reason = "checked to fit")]
-            Some(Operand::Float(f)) if (-END..END).contains(&f) => Ok(f as i64),
-            Some(Operand::Float(f)) => Err(Fault::new(format!("to_int({f}) does not fit an int")).into()),
+            Some(Operand::Float(f)) => {
+                to_int(f).ok_or_else(|| Fault::new(format!("to_int({f}) does not fit an int")).into())
+            }
             _ => Err(refuse("to_int", &[x])),
         }
     });
