@@ -70,6 +70,7 @@ fn nan_rows(outputs: &OutputBatch, output: OutputSet) -> usize {
         OutputSet::LINE_COLOR => perhaps(&outputs.line_color),
         OutputSet::LINE_WIDTH => outputs.line_width.iter().flatten().filter(|x| x.is_nan()).count(),
         OutputSet::COLOR => perhaps(&outputs.color),
+        OutputSet::LINE_OPACITY => numbers(&outputs.line_opacity),
         _ => 0,
     }
 }
