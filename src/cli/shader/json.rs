@@ -13,7 +13,7 @@
 //!       "report": null |                null if the shader does not compile or cannot be read
 //!         { "mode": "constant" | "kernel" | "interpreted",
 //!           "blame": { "line": 3, "column": 5, "message": "…" } | null,     why it is interpreted, where known
-//!           "ns_per_hit": 1700.0 | null,          of an interpreted shader, measured
+//!           "ns_per_hit": 1700.0 | null,          measured; null for a constant shader, or one that fails
 //!           "complete": true,                     whether the facts below are known to be complete
 //!           "inputs": ["irradiance"],             what is read on `hit`, in the order of the contract
 //!           "outputs": [                          what may be returned, in the order of the contract

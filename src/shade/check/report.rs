@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use super::TRIAL_HITS;
 use crate::shade::analysis::{Analysis, Finding, OutputFact};
 use crate::shade::names::{AOV_PREFIX, InputSet, OutputSet};
 use crate::shade::params::{Params, Value};
@@ -14,8 +15,10 @@ pub struct Report {
     pub mode: Mode,
     /// For an interpreted shader: the construct because of which it is, if one is to blame.
     pub blame: Option<Finding>,
-    /// For an interpreted shader: nanoseconds of CPU time for each hit, measured on this machine.
+    /// Of a shader that is not constant: nanoseconds of CPU time for each hit, measured on this machine.
     pub nanoseconds_per_hit: Option<f64>,
+    /// Trial hits that the interpreter was run for. Of a kernel: those that it gave up.
+    pub interpreted_hits: u64,
     /// What it reads and writes.
     pub analysis: Analysis,
     /// Its parameters, with the values that were set.
@@ -23,11 +26,12 @@ pub struct Report {
 }
 
 impl Report {
-    pub(super) fn new(shader: &Shader, nanoseconds_per_hit: Option<f64>) -> Self {
+    pub(super) fn new(shader: &Shader, nanoseconds_per_hit: Option<f64>, interpreted_hits: u64) -> Self {
         Self {
             mode: shader.mode(),
             blame: shader.blame().cloned(),
             nanoseconds_per_hit,
+            interpreted_hits,
             analysis: shader.analysis().clone(),
             params: shader.params().clone(),
         }
@@ -62,7 +66,7 @@ impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.mode {
             Mode::Constant => writeln!(f, "  mode        constant: evaluated once")?,
-            Mode::Kernel => writeln!(f, "  mode        kernel")?,
+            Mode::Kernel => writeln!(f, "  mode        kernel: runs over batches of hits")?,
             Mode::Interpreted => writeln!(f, "  mode        interpreted, at every hit")?,
         }
         if let Some(blame) = &self.blame {
@@ -71,6 +75,10 @@ impl fmt::Display for Report {
         }
         if let Some(cost) = self.nanoseconds_per_hit {
             writeln!(f, "  cost        {cost:.0} ns a hit, measured here")?;
+        }
+        if self.mode == Mode::Kernel && self.interpreted_hits > 0 {
+            let hits = self.interpreted_hits;
+            writeln!(f, "  gives up    {hits} of {TRIAL_HITS} trial hits, which the interpreter runs")?;
         }
         let inputs = self.inputs();
         let reads = match self.analysis.complete {
