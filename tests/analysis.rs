@@ -39,6 +39,7 @@ fn texture(a: [u8; 4], b: [u8; 4]) -> Arc<Texture> {
         image: Arc::new(image),
         wrap: [Wrap::Repeat; 2],
         filter: TextureFilter::Linear,
+        levels: Default::default(),
     })
 }
 

@@ -13,6 +13,7 @@ mod shade;
 mod shader_check;
 // ... rays, lines and pixels, ...
 mod film;
+mod footprint;
 mod light;
 mod line;
 mod trace;

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use super::ids::ScriptId;
+use super::ids::{ScriptId, TextureId};
 use super::texture::TextureRef;
 use crate::diag::{Source, Span};
 use crate::math::{Vec2, Vec3, Vec4};
@@ -16,6 +16,29 @@ pub struct Script {
     pub source: Arc<Source>,
     /// Where it was read from; `None` for scripts built into Tusche or made by code.
     pub path: Option<PathBuf>,
+}
+
+/// Files that scripts name, found and read when the scene was loaded.
+#[derive(Clone, Debug, Default)]
+pub struct ScriptFiles {
+    /// Modules, by the name of the source that imports them and the path as written there. A file has one name,
+    /// whoever imports it.
+    pub modules: BTreeMap<(String, String), Arc<Source>>,
+    /// Images, as entries of the scene's table of textures.
+    pub textures: BTreeMap<TextureKey, TextureId>,
+}
+
+/// An image as a script names it.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct TextureKey {
+    /// Name of the script's source.
+    pub script: String,
+    /// The path as written.
+    pub path: String,
+    /// `repeat`, `mirror` or `clamp`.
+    pub wrap: String,
+    /// `srgb` or `linear`.
+    pub color: String,
 }
 
 /// A parameter's value as written in a scene file or a model.

@@ -4,6 +4,7 @@
 //! a scene by hand does. [`SceneBuilder::build`] checks what must hold between the parts, and from then on every id is
 //! in range, every number finite, and no default is left to choose.
 
+pub mod attributes;
 pub mod camera;
 pub mod file;
 pub mod framing;
@@ -12,6 +13,7 @@ pub mod ids;
 pub mod light;
 pub mod material;
 pub mod mesh;
+pub mod script_files;
 pub mod settings;
 pub mod shape;
 pub mod texture;
@@ -20,10 +22,11 @@ use std::sync::Arc;
 
 use crate::diag::{Diagnostic, Diagnostics, Span};
 use crate::math::DAffine3;
+use attributes::{AttributeTable, Attributes};
 use camera::Camera;
 use ids::{MaterialId, MeshId, ObjectId, ScriptId, TextureId};
 use light::Light;
-use material::{Material, Script};
+use material::{Material, Script, ScriptFiles};
 use mesh::Mesh;
 use settings::{LineSettings, RayKinds, RenderSettings};
 use texture::Texture;
@@ -54,6 +57,7 @@ pub struct Object {
 pub struct Scene {
     parts: SceneBuilder,
     camera: Camera,
+    attributes: AttributeTable,
 }
 
 impl Scene {
@@ -97,6 +101,18 @@ impl Scene {
     #[must_use]
     pub fn scripts(&self) -> &[Script] {
         &self.parts.scripts
+    }
+
+    /// The attributes of all objects.
+    #[must_use]
+    pub fn attributes(&self) -> &AttributeTable {
+        &self.attributes
+    }
+
+    /// The files that scripts name.
+    #[must_use]
+    pub fn script_files(&self) -> &ScriptFiles {
+        &self.parts.script_files
     }
 
     /// All textures; `TextureId` is the index.
@@ -145,12 +161,16 @@ pub struct SceneBuilder {
     pub time: f32,
     /// All objects.
     pub objects: Vec<Object>,
+    /// Attributes of objects and materials.
+    pub attributes: Attributes,
     /// All meshes.
     pub meshes: Vec<Arc<Mesh>>,
     /// All materials.
     pub materials: Vec<Material>,
     /// All scripts.
     pub scripts: Vec<Script>,
+    /// The files that scripts name (see [`script_files::load`]).
+    pub script_files: ScriptFiles,
     /// All textures.
     pub textures: Vec<Arc<Texture>>,
     /// All lights.
@@ -212,7 +232,10 @@ impl SceneBuilder {
         check::check(&self, &mut faults);
         let camera = self.chosen_camera().map_err(|fault| faults.push(fault)).ok().cloned();
         match camera {
-            Some(camera) if !faults.has_errors() => Ok(Scene { parts: self, camera }),
+            Some(camera) if !faults.has_errors() => {
+                let attributes = self.attributes.table(&self.objects);
+                Ok(Scene { parts: self, camera, attributes })
+            }
             _ => Err(faults),
         }
     }

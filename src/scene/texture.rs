@@ -1,18 +1,18 @@
 //! Images that scripts look up: decoding, and lookups.
 //!
 //! An [`Image`] holds finite numbers only, so a lookup of finite pixels is finite and inside [`Texture::range`], whatever
-//! the texture coordinates are: the shading host may bound a shader's outputs by it. There are no mipmaps; a picture
-//! takes many samples per pixel, and each looks up the full image.
+//! the texture coordinates are: the shading host may bound a shader's outputs by it. A picture takes many samples per
+//! pixel, and each looks up the full image, unless the texture asks for [`TextureFilter::Mipmap`].
 
 use std::io::Cursor;
 use std::path::Path;
-use std::sync::{Arc, LazyLock};
+use std::sync::{Arc, LazyLock, OnceLock};
 
 use image::{DynamicImage, ImageReader};
 
 use super::ids::TextureId;
 use crate::diag::Diagnostic;
-use crate::math::{Affine2, Vec2, Vec4, linear_from_srgb};
+use crate::math::{Affine2, Vec2, Vec4, linear_from_srgb, portable};
 
 /// The largest width or height of an image, in pixels.
 pub const MAX_SIDE: u32 = 32_768;
@@ -47,6 +47,8 @@ pub enum TextureFilter {
     /// Bilinear.
     #[default]
     Linear,
+    /// Bilinear in the two of a series of smaller images that fit the width of a pixel, and between them.
+    Mipmap,
 }
 
 /// Pixels of an image, row by row from the top.
@@ -88,6 +90,8 @@ pub struct Texture {
     pub wrap: [Wrap; 2],
     /// Between pixels.
     pub filter: TextureFilter,
+    /// Smaller images, each half as large as the one before; made when first looked up.
+    pub levels: OnceLock<Vec<Image>>,
 }
 
 /// A material's use of a texture: which texture, which uv set, and where on it.
@@ -136,14 +140,38 @@ impl Texture {
                 let near = |t: f32, size: u32| ((t * size as f32) as u32).min(size - 1);
                 image.pixel(near(u, image.width), near(v, image.height))
             }
-            TextureFilter::Linear => {
-                let (x0, x1, fx) = neighbors(u, image.width, self.wrap[0]);
-                let (y0, y1, fy) = neighbors(v, image.height, self.wrap[1]);
-                let top = between(image.pixel(x0, y0), image.pixel(x1, y0), fx);
-                let bottom = between(image.pixel(x0, y1), image.pixel(x1, y1), fx);
-                between(top, bottom, fy)
-            }
+            TextureFilter::Linear | TextureFilter::Mipmap => self.bilinear(image, u, v),
         }
+    }
+
+    /// The same for a pixel that covers `width` units of uv; only [`TextureFilter::Mipmap`] makes a difference.
+    ///
+    /// With `level = log2(width * sqrt(columns * rows))` of the image, clamped to the levels there are: linear between
+    /// the levels below and above.
+    #[must_use]
+    pub fn sample_wide(&self, uv: Vec2, width: f32) -> Vec4 {
+        let image = &*self.image;
+        let pixels = width * (image.width as f32 * image.height as f32).sqrt();
+        // Also where the width is no number.
+        if self.filter != TextureFilter::Mipmap || !(pixels > 1.0) {
+            return self.sample(uv);
+        }
+        let levels = self.levels.get_or_init(|| smaller(image));
+        let level = portable::log2(pixels).min(levels.len() as f32);
+        let below = level.floor();
+        let (u, v) = (fold(uv.x, self.wrap[0]), fold(uv.y, self.wrap[1]));
+        let of = |level: usize| level.checked_sub(1).map_or(image, |index| &levels[index]);
+        let low = self.bilinear(of(below as usize), u, v);
+        let high = self.bilinear(of((below as usize + 1).min(levels.len())), u, v);
+        between(low, high, level - below)
+    }
+
+    fn bilinear(&self, image: &Image, u: f32, v: f32) -> Vec4 {
+        let (x0, x1, fx) = neighbors(u, image.width, self.wrap[0]);
+        let (y0, y1, fy) = neighbors(v, image.height, self.wrap[1]);
+        let top = between(image.pixel(x0, y0), image.pixel(x1, y0), fx);
+        let bottom = between(image.pixel(x0, y1), image.pixel(x1, y1), fx);
+        between(top, bottom, fy)
     }
 
     /// The least and the greatest linear value of each channel (red, green, blue, alpha): no lookup leaves them.
@@ -163,6 +191,53 @@ impl Texture {
             }
         }
     }
+}
+
+/// Images of half the size, and half of that, down to one pixel. Each pixel is the mean of those it covers, within them.
+fn smaller(image: &Image) -> Vec<Image> {
+    let mut levels: Vec<Image> = Vec::new();
+    loop {
+        let next = {
+            let last = levels.last().unwrap_or(image);
+            if last.width == 1 && last.height == 1 {
+                return levels;
+            }
+            halved(last)
+        };
+        levels.push(next);
+    }
+}
+
+fn halved(image: &Image) -> Image {
+    let (width, height) = ((image.width / 2).max(1), (image.height / 2).max(1));
+    let mut data = Vec::with_capacity(width as usize * height as usize);
+    for y in 0..height {
+        for x in 0..width {
+            let (mut sum, mut weights) = (Vec4::ZERO, 0.0);
+            let (mut low, mut high) = (Vec4::INFINITY, Vec4::NEG_INFINITY);
+            for (row, row_weight) in covered(y, height, image.height) {
+                for (column, weight) in covered(x, width, image.width) {
+                    let pixel = image.pixel(column, row);
+                    sum += pixel * (weight * row_weight);
+                    weights += weight * row_weight;
+                    (low, high) = (low.min(pixel), high.max(pixel));
+                }
+            }
+            data.push((sum / weights).clamp(low, high).to_array());
+        }
+    }
+    Image { width, height, pixels: Pixels::Rgba32F { data } }
+}
+
+/// The pixels of a row of `from` that pixel `index` of `to` covers, each with how much of it.
+fn covered(index: u32, to: u32, from: u32) -> impl Iterator<Item = (u32, f32)> {
+    let scale = f64::from(from) / f64::from(to);
+    let (start, end) = (f64::from(index) * scale, f64::from(index + 1) * scale);
+    let last = (end.ceil() as u32).min(from);
+    (start as u32..last).map(move |pixel| {
+        let (left, right) = (f64::from(pixel).max(start), f64::from(pixel + 1).min(end));
+        (pixel, (right - left).max(0.0) as f32)
+    })
 }
 
 fn bounds<T: Copy>(

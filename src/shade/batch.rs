@@ -1,7 +1,10 @@
 //! Batches: the inputs and outputs of many hits of one material, as columns.
 
+use std::sync::Arc;
+
 use super::names::PathKind;
 use crate::math::{Vec2, Vec3, Vec4};
+use crate::scene::attributes::AttributeSet;
 
 /// What one light gives one hit.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -38,6 +41,13 @@ pub struct HitBatch {
     pub front_facing: Vec<bool>,
     pub pixels_per_unit: Vec<f32>,
     pub curvature: Vec<f32>,
+    pub footprint: Vec<f32>,
+    pub uv_footprint: Vec<f32>,
+    /// Each hit's set among `attributes`. Empty also where no hit of the material has an attribute that its shader asks
+    /// for: all get the default.
+    pub attribute_set: Vec<u32>,
+    /// All sets of attributes of the scene; not a column, and kept when the batch is emptied.
+    pub attributes: Arc<Vec<AttributeSet>>,
     /// `light_count` samples for each hit, hit by hit.
     pub lights: Vec<LightSample>,
     /// Lights in the scene.
@@ -70,6 +80,10 @@ impl HitBatch {
             front_facing,
             pixels_per_unit,
             curvature,
+            footprint,
+            uv_footprint,
+            attribute_set,
+            attributes: _,
             lights,
             light_count: _,
             time: _,
@@ -93,6 +107,9 @@ impl HitBatch {
         front_facing.clear();
         pixels_per_unit.clear();
         curvature.clear();
+        footprint.clear();
+        uv_footprint.clear();
+        attribute_set.clear();
         lights.clear();
     }
 }

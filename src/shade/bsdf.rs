@@ -71,7 +71,7 @@ impl Bsdf {
     }
 
     /// The index of refraction on the viewer's side over the one behind.
-    fn eta(&self) -> f32 {
+    pub fn eta(&self) -> f32 {
         if self.outside { 1.0 / self.ior } else { self.ior }
     }
 

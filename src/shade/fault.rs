@@ -8,7 +8,9 @@ use std::sync::Arc;
 use rhai::{Dynamic, EvalAltResult, LexError, ParseError, ParseErrorType, Position};
 
 use super::host::{MAX_ARRAY, MAX_CALL_DEPTH, MAX_EXPRESSION_DEPTH, MAX_MAP, MAX_OPERATIONS, MAX_TEXT};
+use super::closures;
 use super::library;
+use super::script::Functions;
 use super::names::{AOV_PREFIX, OutputSet};
 use crate::diag::{Diagnostic, Source, Span, nearest};
 
@@ -103,35 +105,61 @@ pub(super) fn from_parse_error(error: &ParseError, source: &Arc<Source>) -> Diag
     fault.at(span(source, error.position()))
 }
 
-/// An error of a run, at its innermost place.
-/// `surface` is where to point if the engine knows no place.
-pub(super) fn from_run(error: &EvalAltResult, surface: &Span, functions: &[(String, usize)]) -> Diagnostic {
+/// An error of a run, at its innermost place. `files` and `functions` are the program's, `surface` is where to point if
+/// the engine knows no place.
+pub(super) fn from_run(
+    error: &EvalAltResult,
+    surface: &Span,
+    files: &[Arc<Source>],
+    functions: &Functions,
+) -> Diagnostic {
     let mut place = error.position();
+    let mut file = 0;
+    let mut at = 0;
     let mut error = error;
     let mut callers = Vec::new();
-    while let EvalAltResult::ErrorInFunctionCall(name, _, inner, call) = error {
-        callers.push((name.as_str(), *call));
+    while let EvalAltResult::ErrorInFunctionCall(called, _, inner, call) = error {
+        callers.push((called.as_str(), at, *call));
+        // A closure is called within its own file.
+        at = functions.iter().find(|((key, _), f)| key == called && !f.is_closure()).map_or(at, |(_, f)| f.file);
         error = inner;
         if !inner.position().is_none() {
             place = inner.position();
+            file = at;
         }
     }
-    let mut fault = explain(error, functions);
-    for (name, call) in callers.iter().rev().filter(|(_, call)| !call.is_none()) {
+    let mut fault = explain(error, functions, file);
+    for (called, from, call) in callers.iter().rev().filter(|(_, _, call)| !call.is_none()) {
         let (line, column) = (call.line().unwrap_or(0), call.position().unwrap_or(0));
-        fault = fault.hint(format!("`{name}` was called at line {line}, column {column}"));
+        let what = match written(called, functions) {
+            Some(name) => format!("`{name}`"),
+            None => "the closure".to_owned(),
+        };
+        fault = fault.hint(if *from == file {
+            format!("{what} was called at line {line}, column {column}")
+        } else {
+            format!("{what} was called at {}:{line}:{column}", files[*from].name)
+        });
     }
-    fault.at(if place.is_none() { surface.clone() } else { span(&surface.source, place) })
+    fault.at(if place.is_none() { surface.clone() } else { span(&files[file], place) })
 }
 
-fn explain(error: &EvalAltResult, functions: &[(String, usize)]) -> Fault {
+/// A function's name as written; `None` for closures.
+fn written<'n>(called: &'n str, functions: &'n Functions) -> Option<&'n str> {
+    if called.starts_with(closures::PREFIX) {
+        return None;
+    }
+    Some(functions.iter().find(|((key, _), _)| key == called).map_or(called, |(_, function)| &function.name))
+}
+
+fn explain(error: &EvalAltResult, functions: &Functions, file: usize) -> Fault {
     use EvalAltResult as Kind;
     match error {
         Kind::ErrorRuntime(token, _) => match token.read_lock::<Fault>() {
             Some(fault) => fault.clone(),
             None => Fault::new(format!("the script stopped itself: {token}")),
         },
-        Kind::ErrorFunctionNotFound(signature, _) => unknown_function(signature, functions),
+        Kind::ErrorFunctionNotFound(signature, _) => unknown_function(signature, functions, file),
         Kind::ErrorVariableNotFound(name, _) => unknown_variable(name),
         Kind::ErrorPropertyNotFound(name, _) => Fault::new(format!("this record has no `{name}`"))
             .hint(format!("`\"{name}\" in record` tells whether it has")),
@@ -216,7 +244,7 @@ fn unknown_variable(name: &str) -> Fault {
 }
 
 /// `signature` is as Rhai writes it: `name (type, type)`.
-fn unknown_function(signature: &str, functions: &[(String, usize)]) -> Fault {
+fn unknown_function(signature: &str, functions: &Functions, file: usize) -> Fault {
     let (name, types) = signature.split_once(" (").unwrap_or((signature, ")"));
     let types: Vec<_> =
         types.trim_end_matches(')').split(", ").filter(|name| !name.is_empty()).map(type_name).collect();
@@ -227,10 +255,18 @@ fn unknown_function(signature: &str, functions: &[(String, usize)]) -> Fault {
             _ => Fault::new(format!("`{name}` does not work on {}", types.join(", "))),
         };
     }
-    let own: Vec<_> = functions.iter().filter(|(known, _)| known == name).collect();
+    if name.starts_with(closures::PREFIX) {
+        return Fault::new("the closure is called with another number of arguments than it has parameters");
+    }
+    let all: Vec<(&str, usize)> = functions
+        .iter()
+        .filter(|(_, function)| function.file == file && !function.is_closure())
+        .map(|((_, count), function)| (function.name.as_str(), *count))
+        .collect();
+    let own: Vec<_> = all.iter().filter(|(known, _)| *known == name).collect();
     let library: Vec<_> = library::functions().filter(|known| known.name == name).collect();
     if own.is_empty() && library.is_empty() {
-        let names = functions.iter().map(|(name, _)| name.as_str()).chain(library::functions().map(|f| f.name));
+        let names = all.iter().map(|(name, _)| *name).chain(library::functions().map(|f| f.name));
         let fault = Fault::new(format!("there is no function `{name}`"));
         return match nearest(name, names) {
             Some(near) => fault.hint(format!("did you mean `{near}`?")),

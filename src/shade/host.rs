@@ -11,11 +11,12 @@ use rhai::packages::{
     ArithmeticPackage, BasicArrayPackage, BasicIteratorPackage, BasicMapPackage, BasicStringPackage, LogicPackage,
     Package,
 };
-use rhai::{Engine, FloatWrapper, LexError, OptimizationLevel, Token};
+use rhai::{Engine, FloatWrapper, LexError, OptimizationLevel, Position, Token};
 
 use super::library;
 use super::native::{self, Constant, NativeFunction, NativeValue, Package as NativePackage};
 use crate::diag::Diagnostics;
+use crate::scene::texture::Texture;
 
 /// Operations of one call of `surface` or `params`: enough for thousands of noise lookups, and a fraction of a second.
 pub(super) const MAX_OPERATIONS: u64 = 500_000;
@@ -147,8 +148,8 @@ impl Host {
         self
     }
 
-    /// A new engine. `parameters` are the names that scripts may ask of `p`.
-    pub(super) fn engine(&self, parameters: &BTreeSet<String>) -> Engine {
+    /// A new engine. `parameters` are the names that scripts may ask of `p`, `textures` the scene's.
+    pub(super) fn engine(&self, parameters: &BTreeSet<String>, textures: &[Arc<Texture>]) -> Engine {
         let mut engine = Engine::new_raw();
         ArithmeticPackage::new().register_into_engine(&mut engine);
         LogicPackage::new().register_into_engine(&mut engine);
@@ -156,7 +157,7 @@ impl Host {
         BasicStringPackage::new().register_into_engine(&mut engine);
         BasicArrayPackage::new().register_into_engine(&mut engine);
         BasicMapPackage::new().register_into_engine(&mut engine);
-        library::register(&mut engine, parameters);
+        library::register(&mut engine, parameters, textures);
         for register in &self.packages {
             register(&mut engine);
         }
@@ -171,6 +172,16 @@ impl Host {
     }
 }
 
+/// An engine that parses scripts as the host's engines do, but can run none. `edit` sees each token, with its place,
+/// and gives the token to go on with.
+pub(super) fn parser(edit: impl Fn(Token, Position) -> Token + Send + Sync + 'static) -> Engine {
+    let mut engine = Engine::new_raw();
+    confine(&mut engine);
+    #[allow(deprecated, reason = "marked so only because it may change; the version of rhai is pinned")]
+    engine.on_parse_token(move |token, place, _| edit(replace(token), place));
+    engine
+}
+
 fn confine(engine: &mut Engine) {
     engine
         .set_max_operations(MAX_OPERATIONS)
@@ -179,6 +190,7 @@ fn confine(engine: &mut Engine) {
         .set_max_string_size(MAX_TEXT)
         .set_max_array_size(MAX_ARRAY)
         .set_max_map_size(MAX_MAP)
+        // Modules are linked before anything runs (see `link`); nothing is left to import.
         .set_max_modules(0)
         // Rhai compares floats with a tolerance and takes powers from the C library unless its built-in operators
         // can be overridden, which this allows.
@@ -187,8 +199,6 @@ fn confine(engine: &mut Engine) {
         .set_optimization_level(OptimizationLevel::None)
         .set_strict_variables(true)
         .set_fail_on_invalid_map_property(true)
-        // A closure can hold a closure can hold a …, without a bound on the depth.
-        .set_allow_anonymous_fn(false)
         .on_print(|_| {})
         .on_debug(|_, _, _| {});
     #[allow(deprecated, reason = "marked so only because it may change; the version of rhai is pinned")]
@@ -222,10 +232,10 @@ fn replace(token: Token) -> Token {
         return Token::FloatConstant((FloatWrapper::new(value), name.into()).into());
     }
     let told = match &token {
-        Token::Import | Token::Export => "modules are not available in shaders: put the functions into this file",
+        Token::Export => "a module has no variables to export: all its functions but the `private` ones can be called",
         Token::Identifier(name) | Token::Reserved(name) => match name.as_str() {
             "eval" => "`eval` is not available in shaders: what a script does must be known from its text",
-            "Fn" | "call" | "curry" => "function pointers are not available in shaders: call the function by its name",
+            "Fn" | "curry" => "function pointers are not available in shaders: call the function by its name",
             _ => return token,
         },
         _ => return token,

@@ -54,48 +54,101 @@ bitflags! {
         const LIGHT = 1 << 21;
         /// uv sets beyond the first, by `texture` lookups.
         const MORE_UVS = 1 << 22;
+        /// `attribute(name, default)`: a value that the object (scene file, model `extras`) or else its material (model
+        /// `extras`) has under this name; the default where none has. Columns: which set of attributes each hit has.
+        const ATTRIBUTE = 1 << 23;
+        /// `footprint`: width of the pixel's cone at the hit, world units, across the ray: 1 / `pixels_per_unit`. Right
+        /// through flat and curved mirrors and glass; of the shadow ray's hits, as if seen from the camera.
+        const FOOTPRINT = 1 << 24;
+        /// `uv_footprint`: how far uv (set 0) moves across the pixel, in the mean of all directions; 0 without uv.
+        const UV_FOOTPRINT = 1 << 25;
     }
 }
 
-/// What scripts read on `hit`, with its spelling, in the order of the bits. `MORE_UVS` is no property: `texture` reads it.
-const INPUT_NAMES: [(&str, InputSet); 22] = [
-    ("position", InputSet::POSITION),
-    ("normal", InputSet::NORMAL),
-    ("geometric_normal", InputSet::GEOMETRIC_NORMAL),
-    ("incoming", InputSet::INCOMING),
-    ("uv", InputSet::UV),
-    ("tangent", InputSet::TANGENT),
-    ("color", InputSet::COLOR),
-    ("object_id", InputSet::OBJECT_ID),
-    ("shader_id", InputSet::SHADER_ID),
-    ("polygon_id", InputSet::POLYGON_ID),
-    ("material_id", InputSet::MATERIAL_ID),
-    ("barycentric", InputSet::BARYCENTRIC),
-    ("distance", InputSet::DISTANCE),
-    ("depth", InputSet::DEPTH),
-    ("path_kind", InputSet::PATH_KIND),
-    ("front_facing", InputSet::FRONT_FACING),
-    ("time", InputSet::TIME),
-    ("pixels_per_unit", InputSet::PIXELS_PER_UNIT),
-    ("curvature", InputSet::CURVATURE),
-    ("irradiance", InputSet::IRRADIANCE),
-    ("light_count", InputSet::LIGHT_COUNT),
-    ("light", InputSet::LIGHT),
+/// An input, for reference pages.
+#[derive(Clone, Copy, Debug)]
+pub struct Input {
+    /// Its name on `hit`.
+    pub name: &'static str,
+    /// Which it is.
+    pub input: InputSet,
+    /// Its type.
+    pub kind: &'static str,
+    /// Unit or space; empty where it has none.
+    pub unit: &'static str,
+    /// Its range; empty where any value is possible.
+    pub range: &'static str,
+    /// What it is.
+    pub about: &'static str,
+}
+
+/// An output, for reference pages.
+#[derive(Clone, Copy, Debug)]
+pub struct Output {
+    /// The key in the record.
+    pub name: &'static str,
+    /// Which it is.
+    pub output: OutputSet,
+    /// Its type.
+    pub kind: &'static str,
+    /// Unit or space; empty where it has none.
+    pub unit: &'static str,
+    /// Its range; empty where any value is possible.
+    pub range: &'static str,
+    /// What stands for it where it is left out.
+    pub default: &'static str,
+    /// What it does.
+    pub about: &'static str,
+}
+
+/// What scripts read on `hit`, in the order of the bits. `MORE_UVS` is no property: `texture` reads it.
+pub const INPUTS: [Input; 25] = [
+    Input { name: "position", input: InputSet::POSITION, kind: "vec3", unit: "world space", range: "", about: "where the ray met the surface" },
+    Input { name: "normal", input: InputSet::NORMAL, kind: "vec3", unit: "world space", range: "length 1", about: "the shading normal, on the side the ray came from" },
+    Input { name: "geometric_normal", input: InputSet::GEOMETRIC_NORMAL, kind: "vec3", unit: "world space", range: "length 1", about: "the normal of the triangle, on the side the ray came from" },
+    Input { name: "incoming", input: InputSet::INCOMING, kind: "vec3", unit: "world space", range: "length 1", about: "the direction of the ray, towards the surface" },
+    Input { name: "uv", input: InputSet::UV, kind: "vec2", unit: "", range: "usually 0 … 1", about: "texture coordinates (set 0), (0, 0) being the image's top left; 0 where the mesh has none" },
+    Input { name: "tangent", input: InputSet::TANGENT, kind: "vec4", unit: "world space", range: "length 1; w is 1 or −1", about: "xyz is the tangent along u; cross(normal, tangent.xyz) * tangent.w is that along v, on the front" },
+    Input { name: "color", input: InputSet::COLOR, kind: "vec4", unit: "linear RGB and alpha", range: "usually 0 … 1", about: "vertex colour; (1, 1, 1, 1) where the mesh has none" },
+    Input { name: "object_id", input: InputSet::OBJECT_ID, kind: "int", unit: "", range: "from 1", about: "which object" },
+    Input { name: "shader_id", input: InputSet::SHADER_ID, kind: "int", unit: "", range: "from 1", about: "which material's shader, as in the `shader` line test" },
+    Input { name: "polygon_id", input: InputSet::POLYGON_ID, kind: "int", unit: "", range: "from 0", about: "which polygon of the mesh" },
+    Input { name: "material_id", input: InputSet::MATERIAL_ID, kind: "int", unit: "", range: "from 1", about: "which material" },
+    Input { name: "barycentric", input: InputSet::BARYCENTRIC, kind: "vec3", unit: "", range: "0 … 1, sum 1", about: "weights of the triangle's three vertices" },
+    Input { name: "distance", input: InputSet::DISTANCE, kind: "float", unit: "world units", range: "0 or more", about: "length of the last ray segment" },
+    Input { name: "depth", input: InputSet::DEPTH, kind: "float", unit: "world units", range: "0 or more", about: "length of the path from the camera" },
+    Input { name: "path_kind", input: InputSet::PATH_KIND, kind: "text", unit: "", range: "`\"camera\"`, `\"reflection\"`, `\"refraction\"`, `\"shadow\"`", about: "which ray met the surface" },
+    Input { name: "front_facing", input: InputSet::FRONT_FACING, kind: "true or false", unit: "", range: "", about: "whether the ray met the front of the triangle" },
+    Input { name: "time", input: InputSet::TIME, kind: "float", unit: "seconds", range: "", about: "the scene's time" },
+    Input { name: "pixels_per_unit", input: InputSet::PIXELS_PER_UNIT, kind: "float", unit: "pixels / world unit", range: "0 or more", about: "how many pixels one world unit at the hit covers, in mirrors and glass too" },
+    Input { name: "curvature", input: InputSet::CURVATURE, kind: "float", unit: "1 / world units", range: "", about: "mean curvature from the vertex normals, positive where the surface bulges towards the ray" },
+    Input { name: "irradiance", input: InputSet::IRRADIANCE, kind: "vec3", unit: "linear RGB", range: "0 or more", about: "light that arrives on this side, shadows included" },
+    Input { name: "light_count", input: InputSet::LIGHT_COUNT, kind: "int", unit: "", range: "from 0", about: "lights of the scene, for `hit.light(i)`" },
+    Input { name: "light", input: InputSet::LIGHT, kind: "a method", unit: "", range: "", about: "`hit.light(i)`: see the functions" },
+    Input { name: "attribute", input: InputSet::ATTRIBUTE, kind: "a method", unit: "", range: "", about: "`hit.attribute(\"name\", default)`: see the functions" },
+    Input { name: "footprint", input: InputSet::FOOTPRINT, kind: "float", unit: "world units", range: "above 0", about: "width of the pixel at the hit, across the ray: 1 / pixels_per_unit" },
+    Input { name: "uv_footprint", input: InputSet::UV_FOOTPRINT, kind: "float", unit: "units of uv", range: "0 or more", about: "how far uv moves across the pixel, for filters; 0 where the mesh has no uv" },
 ];
 
 impl InputSet {
+    /// The inputs that need to know how wide a pixel is at the hit.
+    pub const CONE: Self = Self::PIXELS_PER_UNIT.union(Self::FOOTPRINT).union(Self::UV_FOOTPRINT);
+
+    /// The inputs that are called, as `hit.light(i)`, and not read as properties.
+    pub const CALLED: Self = Self::LIGHT.union(Self::ATTRIBUTE);
+
     /// The inputs that need light samples (and with them shadow rays).
     pub const LIGHTS: Self = Self::IRRADIANCE.union(Self::LIGHT);
 
     /// Every input that has a name on `hit`, with that name, in the order of the bits.
     pub fn named() -> impl Iterator<Item = (&'static str, Self)> {
-        INPUT_NAMES.into_iter()
+        INPUTS.into_iter().map(|entry| (entry.name, entry.input))
     }
 
     /// The input of a name.
     #[must_use]
     pub fn spelled(name: &str) -> Option<Self> {
-        INPUT_NAMES.into_iter().find(|(known, _)| *known == name).map(|(_, input)| input)
+        Self::named().find(|(known, _)| *known == name).map(|(_, input)| input)
     }
 
     /// The columns of a batch that these inputs are computed from.
@@ -143,22 +196,22 @@ bitflags! {
 }
 
 /// The keys of the record, in the order of the bits.
-const OUTPUT_NAMES: [(&str, OutputSet); 15] = [
-    ("base_color", OutputSet::BASE_COLOR),
-    ("metallic", OutputSet::METALLIC),
-    ("roughness", OutputSet::ROUGHNESS),
-    ("specular", OutputSet::SPECULAR),
-    ("ior", OutputSet::IOR),
-    ("transmission", OutputSet::TRANSMISSION),
-    ("opacity", OutputSet::OPACITY),
-    ("emission", OutputSet::EMISSION),
-    ("normal", OutputSet::NORMAL),
-    ("occlusion", OutputSet::OCCLUSION),
-    ("feature", OutputSet::FEATURE),
-    ("line_color", OutputSet::LINE_COLOR),
-    ("line_width", OutputSet::LINE_WIDTH),
-    ("priority", OutputSet::PRIORITY),
-    ("color", OutputSet::COLOR),
+pub const OUTPUTS: [Output; 15] = [
+    Output { name: "base_color", output: OutputSet::BASE_COLOR, kind: "colour or number", unit: "linear RGB", range: "0 … 1", default: "0.8", about: "colour of the surface" },
+    Output { name: "metallic", output: OutputSet::METALLIC, kind: "number", unit: "", range: "0 … 1", default: "0", about: "how much of a metal it is" },
+    Output { name: "roughness", output: OutputSet::ROUGHNESS, kind: "number", unit: "", range: "0 (mirror) … 1", default: "1", about: "how much it blurs what it mirrors" },
+    Output { name: "specular", output: OutputSet::SPECULAR, kind: "number", unit: "", range: "0 … 1", default: "1", about: "weight of the dielectric reflection" },
+    Output { name: "ior", output: OutputSet::IOR, kind: "number", unit: "", range: "above 0", default: "1.5", about: "index of refraction" },
+    Output { name: "transmission", output: OutputSet::TRANSMISSION, kind: "number", unit: "", range: "0 … 1", default: "0", about: "share of light that is refracted instead of scattered" },
+    Output { name: "opacity", output: OutputSet::OPACITY, kind: "number", unit: "", range: "0 (not there) … 1", default: "1", about: "how much of it is there" },
+    Output { name: "emission", output: OutputSet::EMISSION, kind: "colour or number", unit: "linear RGB radiance", range: "0 or more", default: "0", about: "light that it sends out" },
+    Output { name: "normal", output: OutputSet::NORMAL, kind: "vec3", unit: "world space", range: "length 1", default: "`hit.normal`", about: "normal for shading only, as of normal maps; lines keep `hit.normal`" },
+    Output { name: "occlusion", output: OutputSet::OCCLUSION, kind: "number", unit: "", range: "0 … 1", default: "1", about: "share of ambient light that reaches the point" },
+    Output { name: "feature", output: OutputSet::FEATURE, kind: "colour or number", unit: "", range: "", default: "0", about: "lines are drawn where it jumps, as far as the scene's `feature` test asks" },
+    Output { name: "line_color", output: OutputSet::LINE_COLOR, kind: "colour or number", unit: "linear RGB", range: "0 … 1", default: "the scene's", about: "colour of the lines" },
+    Output { name: "line_width", output: OutputSet::LINE_WIDTH, kind: "number", unit: "pixels", range: "0 … `max_width`", default: "the scene's", about: "full width of the lines; 0 or less is no line" },
+    Output { name: "priority", output: OutputSet::PRIORITY, kind: "int", unit: "", range: "", default: "the object's, the material's, 0", about: "whose line is drawn where two surfaces meet: the higher one's" },
+    Output { name: "color", output: OutputSet::COLOR, kind: "colour or number", unit: "linear RGB radiance", range: "", default: "lighting decides", about: "final colour; lighting is bypassed" },
 ];
 
 /// What a script gives for an output.
@@ -177,13 +230,13 @@ pub const AOV_PREFIX: &str = "aov_";
 impl OutputSet {
     /// Every output with its key, in the order of the bits.
     pub fn named() -> impl Iterator<Item = (&'static str, Self)> {
-        OUTPUT_NAMES.into_iter()
+        OUTPUTS.into_iter().map(|entry| (entry.name, entry.output))
     }
 
     /// The output of a key.
     #[must_use]
     pub fn spelled(name: &str) -> Option<Self> {
-        OUTPUT_NAMES.into_iter().find(|(known, _)| *known == name).map(|(_, output)| output)
+        Self::named().find(|(known, _)| *known == name).map(|(_, output)| output)
     }
 
     /// What a script gives for one output.

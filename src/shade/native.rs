@@ -354,7 +354,7 @@ impl NativeFunction {
     /// As in listings of the library.
     #[must_use]
     pub fn listed(&self) -> library::Function<'_> {
-        library::Function { name: self.name, form: &self.form, about: &self.about }
+        library::Function { name: self.name, form: &self.form, about: &self.about, types: "", example: "" }
     }
 
     /// Calls the scalar form. An int is taken where a float is expected.

@@ -64,7 +64,7 @@ impl Params {
 
 impl Value {
     /// What the value is called in messages.
-    fn kind(&self) -> &'static str {
+    pub(super) fn kind(&self) -> &'static str {
         match self {
             Self::Unit | Self::Texture(_) => "a texture",
             Self::Bool(_) => "true or false",
@@ -80,7 +80,7 @@ impl Value {
     }
 
     /// A script's value, if parameters can be such.
-    fn from_script(value: &Dynamic) -> Option<Self> {
+    pub(super) fn from_script(value: &Dynamic) -> Option<Self> {
         if value.is_unit() {
             return Some(Self::Unit);
         }
@@ -111,6 +111,11 @@ impl Value {
         let map = value.as_map_ref().ok()?;
         let entries = map.iter().map(|(key, value)| Some((key.to_string(), Self::from_script(value)?)));
         entries.collect::<Option<_>>().map(Self::Record)
+    }
+
+    /// Whether it is of a type that attributes can have.
+    pub(super) fn can_be_attribute(&self) -> bool {
+        !matches!(self, Self::Unit | Self::Texture(_) | Self::Record(_) | Self::Array(_))
     }
 
     /// A material's value in place of this default, if it is of its type. An int may stand for a float.

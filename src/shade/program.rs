@@ -156,7 +156,7 @@ impl Shader {
             material_id: self.material_id,
             light_count: Some(light_count),
         };
-        Kernel::new(&self.program.ast, &self.params, surroundings).map(Arc::new)
+        Kernel::new(&self.program, &self.params, surroundings).map(Arc::new)
     }
 
     /// The program of its kernel for all outputs, if it has one: for people, and for golden texts.
@@ -174,6 +174,8 @@ pub struct Shaders {
     host: Host,
     /// Every name that some script's `params()` has.
     parameters: BTreeSet<String>,
+    /// The scene's, for scripts that name images.
+    textures: Vec<Arc<Texture>>,
 }
 
 impl Shaders {
@@ -191,7 +193,7 @@ impl Shaders {
     /// # Errors
     /// As [`compile`](Self::compile); and with [`ShadingMode::Kernel`], every construct that cannot be part of a kernel.
     pub fn compile_for(scene: &Scene, host: &Host, mode: ShadingMode) -> Result<(Self, Diagnostics), Diagnostics> {
-        let engine = host.engine(&BTreeSet::new());
+        let engine = host.engine(&BTreeSet::new(), scene.textures());
         let mut faults = host.check().err().unwrap_or_default();
         let mut keep = |result: Result<_, Diagnostics>| result.map_err(|found| faults.extend(found)).ok();
 
@@ -199,7 +201,7 @@ impl Shaders {
             .scripts()
             .iter()
             .map(|script| {
-                keep(Program::parse(&engine, &script.source).and_then(|program| {
+                keep(Program::parse(&script.source, scene.script_files()).and_then(|program| {
                     let defaults = params::defaults(&program, &program.defaults(&engine)?)?;
                     Ok((Arc::new(program), defaults))
                 }))
@@ -210,10 +212,12 @@ impl Shaders {
         let natives: Arc<[NativeFunction]> = host.natives().cloned().collect();
         let mut shaders = Vec::new();
         for (index, material) in scene.materials().iter().enumerate() {
+            let sets = scene.attributes().of_material(MaterialId::from_index(index));
+            let attributes: Vec<_> = sets.keys().map(|set| &scene.attributes().sets()[*set as usize]).collect();
             let Some((program, defaults)) = &scripts[material.script.index()] else { continue };
             match params::resolve(defaults.clone(), material, program) {
                 Ok(params) => {
-                    let analysis = analysis::analyse(&program.ast, &params, scene.textures());
+                    let analysis = analysis::analyse_program(program, &params, scene.textures(), &attributes);
                     for finding in &analysis.findings {
                         let fault = program.found(finding);
                         // Materials that share a script share its faults.
@@ -252,7 +256,8 @@ impl Shaders {
         }
         let parameters = scripts.iter().flatten().flat_map(|(_, defaults)| defaults.keys().cloned()).collect();
         let aovs = extra_outputs(&shaders);
-        Ok((Self { shaders, aovs, host: host.clone(), parameters }, faults))
+        let textures = scene.textures().to_vec();
+        Ok((Self { shaders, aovs, host: host.clone(), parameters, textures }, faults))
     }
 
     /// All shaders, in the order of the materials.
@@ -280,7 +285,7 @@ impl Shaders {
 
     /// An engine for one thread: an engine shared by two would make them wait for each other.
     pub(super) fn engine(&self) -> Engine {
-        self.host.engine(&self.parameters)
+        self.host.engine(&self.parameters, &self.textures)
     }
 }
 

@@ -1,29 +1,71 @@
 //! A script, parsed and checked: its functions, and the places of its parts for messages.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use rhai::{AST, ASTNode, Caches, Dynamic, Engine, EvalAltResult, Expr, ImmutableString, Position, Scope, Stmt};
+use rhai::{
+    AST, ASTNode, Caches, Dynamic, Engine, EvalAltResult, Expr, ImmutableString, Module, Position, Scope, Stmt,
+};
 
 use super::analysis::Finding;
-use super::fault::{Fault, from_parse_error, from_run, span};
-use super::host::{MAX_FUNCTIONS, MAX_SCRIPT};
+use super::closures;
+use super::fault::{Fault, from_run, span};
+use super::link::{Linked, link};
 use super::names::AOV_PREFIX;
 use super::native;
 use crate::diag::{Diagnostic, Diagnostics, Source, Span, nearest};
+use crate::scene::material::ScriptFiles;
 
-/// A parsed script that has a `surface`.
+/// A parsed script that has a `surface`, linked with its modules.
 #[derive(Debug)]
 pub(super) struct Program {
+    /// The script itself.
     pub source: Arc<Source>,
+    /// The script itself, then its modules; [`ScriptFunction::file`] is the index.
+    pub files: Vec<Arc<Source>>,
     pub ast: AST,
-    /// Its functions with their numbers of parameters, sorted.
-    pub functions: Vec<(String, usize)>,
+    /// Its functions and those of its modules, by the name that calls in the syntax tree have, and the number of
+    /// parameters.
+    pub functions: Functions,
     pub surface: Function,
     params: Option<Function>,
+    module: Option<(String, Arc<Module>)>,
 }
 
-/// A function of a script. Its body is run as it stands instead of being called: an error such as a loop without an
-/// end then keeps the place where it happened, which a call replaces by its own.
+/// A function that a script or a module defines.
+#[derive(Clone)]
+pub(super) struct ScriptFunction {
+    /// Its name as written; what the engine calls it for a closure.
+    pub name: String,
+    /// Those of a closure begin with the variables that it captures.
+    pub parameters: Vec<ImmutableString>,
+    pub body: Vec<Stmt>,
+    /// Whether it is for one type of `this` only.
+    pub is_typed: bool,
+    /// Which of the program's files it stands in.
+    pub file: usize,
+    /// Where its name stands.
+    pub span: Span,
+}
+
+/// Functions by name and number of parameters.
+pub(super) type Functions = BTreeMap<(String, usize), ScriptFunction>;
+
+impl std::fmt::Debug for ScriptFunction {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("ScriptFunction").field("name", &self.name).field("span", &self.span).finish_non_exhaustive()
+    }
+}
+
+impl ScriptFunction {
+    /// Whether it is written as `|x| …`.
+    pub fn is_closure(&self) -> bool {
+        self.name.starts_with(closures::PREFIX)
+    }
+}
+
+/// A function that is run from outside. Its body is run as it stands instead of being called: an error such as a loop
+/// without an end then keeps the place where it happened, which a call replaces by its own.
 pub(super) struct Function {
     parameters: Vec<ImmutableString>,
     body: Vec<Stmt>,
@@ -38,81 +80,57 @@ impl std::fmt::Debug for Function {
 }
 
 impl Program {
-    /// Parses a script and checks its functions.
-    pub fn parse(engine: &Engine, source: &Arc<Source>) -> Result<Self, Diagnostics> {
-        let size = source.text.len();
-        if size > MAX_SCRIPT {
-            let fault = Diagnostic::error(format!("a script may have at most {MAX_SCRIPT} bytes, and this has {size}"));
-            return Err(fault.in_file(&source.name).into());
-        }
-        let ast = engine.compile(source.text.as_str()).map_err(|error| from_parse_error(&error, source))?;
-        let count = ast.iter_fn_def().count();
-        if count > MAX_FUNCTIONS {
-            let fault =
-                Fault::new(format!("a script may have at most {MAX_FUNCTIONS} functions, and this has {count}"));
-            return Err(fault.at(Span::new(source, 0..0)).into());
-        }
+    /// Parses a script with its modules, and checks their functions. `files` are the scene's.
+    pub fn parse(source: &Arc<Source>, files: &ScriptFiles) -> Result<Self, Diagnostics> {
+        let Linked { files, ast, functions, module } = link(source, files)?;
         let mut faults = Diagnostics::default();
-        if let Some(statement) = ast.statements().first() {
-            faults.push(
-                Fault::new("only functions can stand at the top level of a shader")
-                    .hint("move values into `params()`, or into functions such as `fn levels() { 4 }`")
-                    .at(span(source, statement.position())),
-            );
-        }
-        let surface = Self::find(&ast, source, "surface", 2, "surface(hit, p)", &mut faults);
+        let surface = Self::find(&functions, "surface", 2, "surface(hit, p)", &mut faults);
         if surface.is_none() && !faults.has_errors() {
             let fault = Fault::new("this shader has no function `surface`");
-            let fault = match nearest("surface", ast.iter_functions().map(|function| function.name)) {
+            let fault = match nearest("surface", functions.values().filter(|f| f.file == 0 && !f.is_closure()).map(|f| f.name.as_str())) {
                 Some(near) => fault.hint(format!("is `{near}` meant to be it?")),
                 None => fault,
             };
             let hint = "write: fn surface(hit, p) { #{ base_color: rgb(0.8, 0.2, 0.1) } }";
             faults.push(fault.hint(hint).at(Span::new(source, 0..0)));
         }
-        let params = Self::find(&ast, source, "params", 0, "params()", &mut faults);
+        let params = Self::find(&functions, "params", 0, "params()", &mut faults);
         match surface {
             Some(surface) if !faults.has_errors() => {
-                let mut functions: Vec<_> =
-                    ast.iter_functions().map(|function| (function.name.to_owned(), function.params.len())).collect();
-                functions.sort();
-                Ok(Self { source: Arc::clone(source), functions, surface, params, ast })
+                Ok(Self { source: Arc::clone(source), files, functions, surface, params, ast, module })
             }
             _ => Err(faults),
         }
     }
 
-    /// The function of a name, if it has `count` parameters. One of that name with others only is a fault.
+    /// The script's own function of a name, if it has `count` parameters. One of that name with others only is a fault.
     fn find(
-        ast: &AST,
-        source: &Arc<Source>,
+        functions: &Functions,
         name: &str,
         count: usize,
         form: &str,
         faults: &mut Diagnostics,
     ) -> Option<Function> {
-        let found: Vec<_> = ast.iter_fn_def().filter(|function| function.name == name).collect();
-        if let Some(function) = found.iter().find(|function| function.params.len() == count) {
-            let mut alone = ast.clone();
-            alone.retain_functions(|_, _, known, n| known == name && n == count);
-            let mut body = Vec::new();
-            alone.walk(&mut |path| {
-                if let [ASTNode::Stmt(statement)] = path {
-                    body.push((*statement).clone());
-                }
-                true
-            });
-            let span = name_span(source, function.body.start_position(), name);
-            return Some(Function { parameters: function.params.to_vec(), body, span });
+        let found: Vec<_> =
+            functions.iter().filter(|(_, function)| function.name == name && function.file == 0).collect();
+        if let Some((_, function)) = found.iter().find(|((_, n), _)| *n == count) {
+            let ScriptFunction { parameters, body, span, .. } = (*function).clone();
+            return Some(Function { parameters, body, span });
         }
-        for function in found {
+        for (_, function) in found {
             faults.push(
-                Fault::new(format!("`{name}` must have {count} parameters, but it has {}", function.params.len()))
+                Fault::new(format!("`{name}` must have {count} parameters, but it has {}", function.parameters.len()))
                     .hint(format!("write: fn {form}"))
-                    .at(name_span(source, function.body.start_position(), name)),
+                    .at(function.span.clone()),
             );
         }
         None
+    }
+
+    /// The name under which the function table has the script's own `surface`.
+    pub fn surface_key(&self) -> Option<&(String, usize)> {
+        let mut own = self.functions.iter().filter(|(_, function)| function.file == 0);
+        own.find(|((_, count), function)| function.name == "surface" && *count == 2).map(|(key, _)| key)
     }
 
     /// Runs one of the functions with its arguments.
@@ -125,6 +143,9 @@ impl Program {
     ) -> Result<Dynamic, Box<EvalAltResult>> {
         let mut global = engine.new_global_runtime_state();
         global.lib.push(self.ast.shared_lib().clone());
+        if let Some((name, module)) = &self.module {
+            global.push_import(name.as_str(), Arc::clone(module));
+        }
         // Not the outermost level, where `const` would be kept as a global constant.
         global.scope_level = 1;
         let mut scope = Scope::new();
@@ -146,7 +167,7 @@ impl Program {
 
     /// An error of a run, with its place.
     pub fn explain(&self, error: &EvalAltResult) -> Diagnostic {
-        from_run(error, &self.surface.span, &self.functions)
+        from_run(error, &self.surface.span, &self.files, &self.functions)
     }
 
     /// What the analysis found, at its place.
@@ -154,21 +175,12 @@ impl Program {
         let (line, column) = finding.place;
         let span = match line {
             0 => self.surface.span.clone(),
-            _ => Span::word_at(&self.source, line, column.max(1)),
+            _ => Span::word_at(&self.files[finding.file], line, column.max(1)),
         };
         let fault = Diagnostic::error(finding.message.clone()).at(span);
         match &finding.hint {
             Some(hint) => fault.hint(hint.clone()),
             None => fault,
-        }
-    }
-
-    /// Where the name of a function with this many parameters stands.
-    pub fn function_span(&self, name: &str, parameters: usize) -> Span {
-        let mut functions = self.ast.iter_fn_def();
-        match functions.find(|function| function.name == name && function.params.len() == parameters) {
-            Some(function) => name_span(&self.source, function.body.start_position(), name),
-            None => Span::new(&self.source, 0..0),
         }
     }
 
@@ -180,13 +192,13 @@ impl Program {
     /// Where a key is written in a record, or else read or set on one, if it is at one place only.
     pub fn key_span(&self, key: &str) -> Option<Span> {
         let (mut written, mut touched) = (Vec::new(), Vec::new());
-        self.each_key(|name, in_literal, position| {
+        self.each_key(|name, in_literal, file, position| {
             if name == key {
-                if in_literal { &mut written } else { &mut touched }.push(position);
+                if in_literal { &mut written } else { &mut touched }.push((file, position));
             }
         });
         match (written.as_slice(), touched.as_slice()) {
-            ([place], _) | ([], [place]) => Some(span(&self.source, *place)),
+            ([(file, place)], _) | ([], [(file, place)]) => Some(span(&self.files[*file], *place)),
             _ => None,
         }
     }
@@ -194,27 +206,33 @@ impl Program {
     /// Names of extra outputs that are written out anywhere, without the prefix, in any order.
     pub fn written_aovs(&self) -> Vec<String> {
         let mut names = Vec::new();
-        self.each_key(|name, _, _| names.extend(name.strip_prefix(AOV_PREFIX).map(str::to_owned)));
+        self.each_key(|name, _, _, _| names.extend(name.strip_prefix(AOV_PREFIX).map(str::to_owned)));
         names
     }
 
-    /// Shows every key with whether it stands in a record's literal, and its place.
-    fn each_key(&self, mut see: impl FnMut(&str, bool, Position)) {
-        self.ast.walk(&mut |path| {
-            match path.last() {
-                Some(ASTNode::Expr(Expr::Map(map, _))) => {
-                    map.0.iter().for_each(|(key, _)| see(&key.name, true, key.pos))
-                }
-                Some(ASTNode::Expr(Expr::Property(property, position))) => see(&property.2, false, *position),
-                _ => {}
+    /// Shows every key with whether it stands in a record's literal, its file and its place.
+    fn each_key(&self, mut see: impl FnMut(&str, bool, usize, Position)) {
+        for function in self.functions.values() {
+            for statement in &function.body {
+                statement.walk(&mut Vec::new(), &mut |path| {
+                    match path.last() {
+                        Some(ASTNode::Expr(Expr::Map(map, _))) => {
+                            map.0.iter().for_each(|(key, _)| see(&key.name, true, function.file, key.pos))
+                        }
+                        Some(ASTNode::Expr(Expr::Property(property, position))) => {
+                            see(&property.2, false, function.file, *position)
+                        }
+                        _ => {}
+                    }
+                    true
+                });
             }
-            true
-        });
+        }
     }
 }
 
 /// The name of a function whose body starts at `body`.
-fn name_span(source: &Arc<Source>, body: Position, name: &str) -> Span {
+pub(super) fn name_span(source: &Arc<Source>, body: Position, name: &str) -> Span {
     let end = span(source, body).range.start;
     let start = source.text[..end].rfind(&format!("fn {name}")).map_or(end, |at| at + "fn ".len());
     Span::new(source, start..(start + name.len()).min(source.text.len()))

@@ -10,6 +10,7 @@
 //! Everything here works relative to the camera's position, so that precision is best where the camera looks from,
 //! wherever in the world that is.
 
+mod cone;
 mod ray_tree;
 mod scatter;
 mod shadow;

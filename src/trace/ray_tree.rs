@@ -1,5 +1,6 @@
 //! The ray trees of a run of samples while they are traced.
 
+use super::cone::Cone;
 use super::surface::Surface;
 use super::world::{Hit, HitRank};
 use crate::math::Vec3;
@@ -23,8 +24,8 @@ pub(super) struct TreeNode {
     pub reflections: u32,
     /// Letters of the path that are refractions.
     pub refractions: u32,
-    /// Width of the pixel's cone where the ray starts.
-    pub cone_width: f32,
+    /// The pixel's cone where the ray starts.
+    pub cone: Cone,
     /// Path length from the camera to where the ray starts.
     pub length_before: f32,
     /// What the line pass will see; `throughput` is set from the start, the rest once a surface is found.
@@ -39,7 +40,7 @@ pub(super) struct TreeNode {
 
 impl TreeNode {
     /// The node of a camera ray.
-    pub fn root(sample: u32, cone_width: f32) -> Self {
+    pub fn root(sample: u32, cone: Cone) -> Self {
         Self {
             sample,
             parent: None,
@@ -49,7 +50,7 @@ impl TreeNode {
             alpha_weight: 0.0,
             reflections: 0,
             refractions: 0,
-            cone_width,
+            cone,
             length_before: 0.0,
             attributes: Node::default(),
             radiance: Vec3::ZERO,

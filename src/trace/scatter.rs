@@ -1,5 +1,8 @@
 //! Shading: groups of hits of one material become node attributes, radiance and further rays.
 
+use std::sync::Arc;
+
+use super::cone::Cone;
 use super::ray_tree::{Run, TreeNode, WaveHit, WaveRay};
 use super::wave::{TileTracer, TraceContext, Work, value};
 use crate::clock::CpuClock;
@@ -8,6 +11,7 @@ use crate::plan::MaterialPlan;
 use crate::sample::{Node, NodePath};
 use crate::scene::ids::MaterialId;
 use crate::shade::batch::{HitBatch, LightSample, OutputBatch};
+use crate::shade::analysis::inputs::LIMIT;
 use crate::shade::bsdf::{Bounces, unit};
 use crate::shade::{Bsdf, InputSet, Mode, PathKind};
 
@@ -86,12 +90,15 @@ impl TileTracer<'_> {
         hits.material_id = material.0 + 1;
         hits.time = self.scene.time();
         hits.light_count = self.lighting.len();
+        if plan.inputs.contains(InputSet::ATTRIBUTE) {
+            hits.attributes = Arc::clone(self.scene.attributes().sets());
+        }
         if plan.inputs.intersects(InputSet::LIGHTS) {
             hits.lights.extend_from_slice(lights);
         }
         for hit in group {
             let node = &run.nodes[hit.ray.node as usize];
-            self.gather(hits, plan.inputs, hit, node.kind, node.cone_width);
+            self.gather(hits, plan.inputs, hit, node.kind, node.cone);
         }
         shading.shade(material, hits, plan.wanted | self.marker, outputs, errors);
     }
@@ -103,7 +110,7 @@ impl TileTracer<'_> {
         inputs: InputSet,
         hit: &WaveHit,
         kind: PathKind,
-        cone_width: f32,
+        cone: Cone,
     ) {
         let object = self.world.object(hit.hit.object);
         let surface = &hit.surface;
@@ -159,9 +166,22 @@ impl TileTracer<'_> {
         if inputs.contains(InputSet::FRONT_FACING) {
             batch.front_facing.push(surface.front);
         }
-        if inputs.contains(InputSet::PIXELS_PER_UNIT) {
-            let width = cone_width + self.cone.1 * hit.hit.t;
-            batch.pixels_per_unit.push(1.0 / width.max(f32::MIN_POSITIVE));
+        if inputs.intersects(InputSet::CONE) {
+            let footprint = cone.after(hit.hit.t).footprint();
+            if inputs.contains(InputSet::PIXELS_PER_UNIT) {
+                batch.pixels_per_unit.push((1.0 / footprint).min(LIMIT));
+            }
+            if inputs.contains(InputSet::FOOTPRINT) {
+                batch.footprint.push(footprint.min(LIMIT));
+            }
+            if inputs.contains(InputSet::UV_FOOTPRINT) {
+                let cos = surface.geometric_normal.dot(hit.ray.direction).abs().max(0.01);
+                let uv_footprint = footprint / cos.sqrt() * surface.uv_density(object, &hit.hit);
+                batch.uv_footprint.push(uv_footprint.min(LIMIT));
+            }
+        }
+        if inputs.contains(InputSet::ATTRIBUTE) {
+            batch.attribute_set.push(self.scene.attributes().of(hit.hit.object, hit.material));
         }
         if inputs.contains(InputSet::CURVATURE) {
             batch.curvature.push(surface.curvature(object, &hit.hit));
@@ -198,6 +218,7 @@ impl TileTracer<'_> {
         // Its own radiance, and what it sends on.
         let mut bounces = Bounces::default();
         let mut mirrored = Vec3::ZERO;
+        let mut eta = 1.0;
         if let Some(color) = value(&batch.color, row, None) {
             node.radiance = color * opacity;
         } else if self.plan.color || plan.reflects || plan.refracts {
@@ -214,6 +235,7 @@ impl TileTracer<'_> {
             }
             if plan.reflects || plan.refracts {
                 bounces = bsdf.bounces(direction, hit.surface.geometric_normal);
+                eta = bsdf.eta();
             }
         }
 
@@ -229,13 +251,15 @@ impl TileTracer<'_> {
         if node.reflections < self.plan.reflection_depth {
             let weight = bounces.reflection * opacity;
             let kind = PathKind::Reflection;
-            self.send(hit, &node, Departure { kind, direction: mirrored, weight, alpha_weight: 0.0 }, run);
+            self.send(hit, &node, Departure { kind, direction: mirrored, weight, alpha_weight: 0.0, eta: 1.0 }, run);
         }
         if node.refractions < self.plan.refraction_depth {
             let direction = if straight { direction } else { bounces.refracted };
             let alpha_weight = 1.0 - node.alpha;
             let weight = refraction + through;
-            self.send(hit, &node, Departure { kind: PathKind::Refraction, direction, weight, alpha_weight }, run);
+            let eta = if straight { 1.0 } else { eta };
+            let kind = PathKind::Refraction;
+            self.send(hit, &node, Departure { kind, direction, weight, alpha_weight, eta }, run);
         }
     }
 
@@ -286,7 +310,7 @@ impl TileTracer<'_> {
 
     /// Sends a ray on from a hit, unless it could not be seen.
     fn send(&self, hit: &WaveHit, parent: &TreeNode, departure: Departure, run: &mut Run) {
-        let Departure { kind, direction, weight, alpha_weight } = departure;
+        let Departure { kind, direction, weight, alpha_weight, eta } = departure;
         let throughput = Vec3::from(parent.attributes.throughput) * weight;
         if !throughput.is_finite() || throughput.max_element() < LEAST_THROUGHPUT {
             return;
@@ -304,8 +328,22 @@ impl TileTracer<'_> {
             refractions: parent.refractions + u32::from(!reflected),
             length_before: hit.depth,
             attributes: Node { throughput: throughput.to_array(), ..Node::default() },
-            ..TreeNode::root(parent.sample, parent.cone_width + self.cone.1 * hit.hit.t)
+            ..TreeNode::root(parent.sample, self.departing_cone(hit, parent, reflected, eta))
         });
+    }
+
+    /// The pixel's cone where a ray leaves a hit.
+    fn departing_cone(&self, hit: &WaveHit, parent: &TreeNode, reflected: bool, eta: f32) -> Cone {
+        let cone = parent.cone.after(hit.hit.t);
+        if !self.follows_cones || (!reflected && eta == 1.0) {
+            return cone;
+        }
+        let curvature = hit.surface.curvature(self.world.object(hit.hit.object), &hit.hit);
+        if reflected {
+            cone.reflected(curvature)
+        } else {
+            cone.refracted(curvature, eta, -hit.surface.normal.dot(hit.ray.direction))
+        }
     }
 
     /// A position relative to the camera, in the world.
@@ -322,4 +360,6 @@ struct Departure {
     weight: Vec3,
     /// What of its coverage the hit's node takes over.
     alpha_weight: f32,
+    /// Of a refracted ray: the index on its side over the index behind.
+    eta: f32,
 }

@@ -86,7 +86,7 @@ impl TileTracer<'_> {
             let mut batch = HitBatch { material_id: material.0 + 1, time: self.scene.time(), ..HitBatch::default() };
             batch.light_count = self.lighting.len();
             for (_, hit) in &hits[first..end] {
-                self.gather(&mut batch, plan.inputs, hit, PathKind::Shadow, self.cone.0);
+                self.gather(&mut batch, plan.inputs, hit, PathKind::Shadow, self.cone);
                 if plan.inputs.intersects(InputSet::LIGHTS) {
                     let sample = |light| self.lighting.sample(light, hit.surface.position).0;
                     batch.lights.extend((0..self.lighting.len()).map(sample));

@@ -95,6 +95,18 @@ impl Surface {
         a * self.barycentric.x + b * self.barycentric.y + c * self.barycentric.z
     }
 
+    /// How many units of uv one world unit on the triangle covers, in the mean of all directions; 0 without uv.
+    #[must_use]
+    pub fn uv_density(&self, object: &PlacedObject, hit: &Hit) -> f32 {
+        let Some(uvs) = object.mesh.uvs.first() else { return 0.0 };
+        let corners = Self::corners(object, hit);
+        let [a, b, c] = corners.map(|vertex| object.world_from_object * object.mesh.positions[vertex]);
+        let [ta, tb, tc] = corners.map(|vertex| uvs[vertex]);
+        let area = (b - a).cross(c - a).length();
+        let density = ((tb - ta).perp_dot(tc - ta).abs() / area).sqrt();
+        if density.is_finite() { density } else { 0.0 }
+    }
+
     /// Vertex colour; white where the mesh has none.
     #[must_use]
     pub fn color(&self, object: &PlacedObject, hit: &Hit) -> Vec4 {

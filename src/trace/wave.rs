@@ -8,6 +8,7 @@
 
 use std::ops::Range;
 
+use super::cone::Cone;
 use super::ray_tree::{Run, TreeNode, WaveHit, WaveRay};
 use super::surface::Surface;
 use super::triangle::Ray;
@@ -20,7 +21,7 @@ use crate::sample::{PixelRect, SampleBuffer, SampleBufferBuilder, SampleColor};
 use crate::scene::Scene;
 use crate::scene::settings::{Background, RayKinds};
 use crate::shade::batch::{HitBatch, OutputBatch};
-use crate::shade::{Lighting, OutputSet, PathKind, ShadeErrors, Shaders, Shading};
+use crate::shade::{InputSet, Lighting, OutputSet, PathKind, ShadeErrors, Shaders, Shading};
 
 /// Samples of a run of pixels that are traced together.
 const RUN_SAMPLES: usize = 4096;
@@ -75,8 +76,10 @@ pub struct TileTracer<'a> {
     positions: SamplePositions,
     /// Whether rays that leave the scene let the page show through.
     pub(super) transparent: bool,
-    /// Width of a pixel's cone at the camera, and how much it widens per unit of distance.
-    pub(super) cone: (f32, f32),
+    /// A pixel's cone at the camera.
+    pub(super) cone: Cone,
+    /// Whether any shader asks how wide a pixel is, so that curved mirrors and glass must be accounted for.
+    pub(super) follows_cones: bool,
     /// Outputs that mark a hit whose script failed, which no analysis of the script foresees.
     pub(super) marker: OutputSet,
 }
@@ -127,7 +130,8 @@ impl<'a> TileTracer<'a> {
             lighting,
             positions: SamplePositions::new(settings.samples, settings.seed),
             transparent: settings.background == Background::Transparent,
-            cone: (width, angle),
+            cone: Cone { width, spread: angle },
+            follows_cones: plan.materials.iter().any(|material| material.inputs.intersects(InputSet::CONE)),
             marker: marker(plan.color, plan.lines.is_some()),
         }
     }
@@ -187,7 +191,7 @@ impl<'a> TileTracer<'a> {
                 let (origin, direction) = self.scene.camera().ray(size, pixel, offset);
                 let node = run.nodes.len() as u32;
                 run.next.push(WaveRay { origin, direction, node, after: None, passed: 0 });
-                run.nodes.push(TreeNode::root(index as u32 * per_pixel + sample, self.cone.0));
+                run.nodes.push(TreeNode::root(index as u32 * per_pixel + sample, self.cone));
                 offsets.push(offset);
             }
         }

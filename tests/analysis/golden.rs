@@ -412,11 +412,44 @@ fn try_is_given_up() {
 }
 
 #[test]
-fn closures_are_given_up() {
+fn closures_share_what_they_capture() {
     assert_script(
         "let k = 2.0; let f = |x| x * k; #{ roughness: f.call(1.0) }",
+        "inputs: none
+         roughness: always, [2.0, 2.0], constant",
+    );
+    assert_script(
+        "let k = 2.0; let f = |x| x * k; k = hit.barycentric.x; #{ roughness: f.call(1.0), metallic: f.call(0.5) }",
+        "inputs: barycentric
+         metallic: always, [-0.0005, 0.5005], from barycentric
+         roughness: always, [-0.001, 1.001], from barycentric",
+    );
+    assert_script(
+        "let n = 0; let f = || { n += 1; n }; f.call(); if hit.front_facing { f.call(); } #{ priority: n }",
+        "inputs: front_facing
+         priority: always, [1.0, 2.0], from front_facing",
+    );
+    assert_script(
+        "let a = 1.0; let f = |x| x + a; let g = |x| f.call(x) * 2.0; a = 3.0; let n = 0.0;
+         for i in 0..3 { let h = |x| g.call(x) + n; n = h.call(1.0); }
+         #{ roughness: n }",
+        "inputs: none
+         roughness: always, [24.0, 24.0], constant",
+    );
+    assert_script(
+        "let n = 0.0; for i in 0..hit.light_count { let h = |x| x + i; n = saturate(h.call(n)); } #{ roughness: n }",
+        "inputs: light_count
+         roughness: always, [0.0, 1.0], from light_count",
+    );
+}
+
+#[test]
+fn captured_variables_are_copied_by_calls() {
+    // The engine passes a copy of a shared variable where it would pass a variable itself.
+    assert_script(
+        "let a = [1.0]; let f = || a.len(); push(a, 2.0); #{ priority: a.len(), roughness: f.call() }",
         "inputs: all
-         incomplete: 1:51: a closure that captures a variable cannot be analysed",
+         incomplete: 1:70: `push`, which would change a variable that a closure captures, cannot be analysed",
     );
 }
 

@@ -7,6 +7,7 @@ use tusche::diag::{Diagnostics, Source};
 use tusche::math::{Affine2, DVec3, Vec2, Vec3, Vec4};
 use tusche::scene::camera::{Camera, Projection};
 use tusche::scene::ids::{MaterialId, TextureId};
+use tusche::scene::light::{Light, LightKind};
 use tusche::scene::material::{Material, ParamValue, Script};
 use tusche::scene::texture::{Image, Pixels, Texture, TextureFilter, TextureRef, Wrap};
 use tusche::scene::{Scene, SceneBuilder};
@@ -126,6 +127,7 @@ fn scene(script: &str) -> Scene {
         image: Arc::new(Image { width: 4, height: 3, pixels: Pixels::Rgba8 { data, srgb: true } }),
         wrap: [Wrap::Repeat, Wrap::Mirror],
         filter: TextureFilter::Linear,
+        levels: Default::default(),
     });
     let script_id = builder.add_script(Script { source: Source::new("random.rhai", script), path: None });
     let mut params = BTreeMap::new();

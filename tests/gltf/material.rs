@@ -5,8 +5,10 @@ use std::path::Path;
 use std::sync::Arc;
 
 use serde_json::{Value, json};
-use tusche::math::{Affine2, Vec2, Vec3};
+use tusche::math::{Affine2, DVec3, Vec2, Vec3};
 use tusche::scene::SceneBuilder;
+use tusche::scene::attributes::Attribute;
+use tusche::scene::camera::{Camera, Projection};
 use tusche::scene::gltf::{ModelTime, Placement};
 use tusche::scene::ids::MaterialId;
 use tusche::scene::material::{Material, ParamValue};
@@ -463,4 +465,28 @@ fn extras_with_faults() {
         "nodes[0].extras.tusche: expected a record such as {\"shader\": \"ink.rhai\"}\n\
          materials[0].extras.tusche: this text is not JSON: key must be a string at line 1 column 2"
     );
+}
+
+#[test]
+fn extras_become_attributes() {
+    let mut model = made_of(json!({ "extras": { "wear": 0.5, "age": 3, "note": "old" } }));
+    model.json["meshes"][0]["extras"] = json!({ "wear": 0.25, "tint": [1, 0, 0.5], "odd": { "a": 1 }, "none": null });
+    model.json["nodes"][0]["extras"] = json!({ "tint": [0, 1, 0], "worn": true, "tusche": { "priority": 1 } });
+    let (scene, imported) = model.import();
+    assert_eq!(imported.warnings.to_string(), "");
+    let mut scene = scene;
+    let camera = Camera::look_at("c", Projection::Orthographic { height: 1.0 }, DVec3::Z, DVec3::ZERO, DVec3::Y);
+    scene.cameras.extend(camera);
+    let built = scene.build().expect("it is whole");
+    let object = &built.objects()[0];
+    let set = built.attributes().of(tusche::scene::ids::ObjectId(0), object.materials[0]);
+    let expected = [
+        ("age", Attribute::Int(3)),
+        ("note", Attribute::Text("old".into())),
+        ("tint", Attribute::Vec3(Vec3::Y)),
+        ("wear", Attribute::Float(0.25)),
+        ("worn", Attribute::Bool(true)),
+    ];
+    let expected = expected.map(|(name, value)| (name.to_owned(), value)).into();
+    assert_eq!(built.attributes().sets()[set as usize], expected);
 }

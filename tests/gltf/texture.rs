@@ -25,7 +25,7 @@ fn decoded(bytes: &[u8], srgb: bool) -> Image {
 fn row(values: &[f32], wrap: Wrap, filter: TextureFilter) -> Texture {
     let data = values.iter().map(|value| [*value, 0.0, 0.0, 1.0]).collect();
     let image = Image { width: values.len() as u32, height: 1, pixels: Pixels::Rgba32F { data } };
-    Texture { name: "row".into(), image: Arc::new(image), wrap: [wrap; 2], filter }
+    Texture { name: "row".into(), image: Arc::new(image), wrap: [wrap; 2], filter, levels: Default::default() }
 }
 
 #[test]
@@ -118,7 +118,7 @@ fn crc32(bytes: &[u8]) -> u32 {
 fn the_upper_left_pixel_is_at_zero() {
     let image = decoded(&png(2, 2, &[[255, 0, 0, 255], [0, 255, 0, 255], [0, 0, 255, 255], [0; 4]]), false);
     let texture =
-        Texture { name: String::new(), image: Arc::new(image), wrap: [Wrap::Clamp; 2], filter: TextureFilter::Nearest };
+        Texture { name: String::new(), image: Arc::new(image), wrap: [Wrap::Clamp; 2], filter: TextureFilter::Nearest, levels: Default::default() };
     assert_eq!(texture.sample(Vec2::new(0.1, 0.1)), Vec4::new(1., 0., 0., 1.));
     assert_eq!(texture.sample(Vec2::new(0.9, 0.1)), Vec4::new(0., 1., 0., 1.));
     assert_eq!(texture.sample(Vec2::new(0.1, 0.9)), Vec4::new(0., 0., 1., 1.));
@@ -129,7 +129,7 @@ fn the_upper_left_pixel_is_at_zero() {
 fn lookups_decode_srgb_but_not_alpha() {
     let image = decoded(&png(1, 1, &[[188, 0, 255, 128]]), true);
     let texture =
-        Texture { name: String::new(), image: Arc::new(image), wrap: [Wrap::Repeat; 2], filter: TextureFilter::Linear };
+        Texture { name: String::new(), image: Arc::new(image), wrap: [Wrap::Repeat; 2], filter: TextureFilter::Linear, levels: Default::default() };
     assert_eq!(texture.sample(Vec2::ZERO), Vec4::new(linear_from_srgb(188. / 255.), 0., 1., 128. / 255.));
 }
 
@@ -180,7 +180,7 @@ fn absurd_coordinates_read_as_zero() {
 fn the_range_is_that_of_the_pixels() {
     let image = decoded(&png(2, 1, &[[10, 200, 0, 255], [20, 100, 0, 51]]), true);
     let texture =
-        Texture { name: String::new(), image: Arc::new(image), wrap: [Wrap::Repeat; 2], filter: TextureFilter::Linear };
+        Texture { name: String::new(), image: Arc::new(image), wrap: [Wrap::Repeat; 2], filter: TextureFilter::Linear, levels: Default::default() };
     let linear = |c: f32| linear_from_srgb(c / 255.0);
     assert_eq!(texture.range(), ([linear(10.), linear(100.), 0., 0.2], [linear(20.), linear(200.), 0., 1.]));
     assert_eq!(row(&[-3., 5., 1.], Wrap::Clamp, TextureFilter::Linear).range(), ([-3., 0., 0., 1.], [5., 0., 0., 1.]));
@@ -203,4 +203,34 @@ proptest! {
             prop_assert!((0..4).all(|c| least[c] <= found[c] && found[c] <= greatest[c]), "{found} {least:?} {greatest:?}");
         }
     }
+}
+
+#[test]
+fn mipmaps_are_means() {
+    let data = (0..16).map(|i| if (i % 4 + i / 4) % 2 == 0 { [1.0, 0.0, 0.25, 1.0] } else { [0.0, 1.0, 0.25, 1.0] });
+    let image = Image { width: 4, height: 4, pixels: Pixels::Rgba32F { data: data.collect() } };
+    let checked = Texture {
+        name: "checked".into(),
+        image: Arc::new(image),
+        wrap: [Wrap::Repeat; 2],
+        filter: TextureFilter::Mipmap,
+        levels: Default::default(),
+    };
+    let at = Vec2::new(0.125, 0.125);
+    assert_eq!(checked.sample(at), Vec4::new(1.0, 0.0, 0.25, 1.0));
+    // A pixel as wide as one of the image's, or without a width, sees the image itself.
+    assert_eq!(checked.sample_wide(at, 0.25), checked.sample(at));
+    assert_eq!(checked.sample_wide(at, f32::NAN), checked.sample(at));
+    // Wider ones see ever less of the pattern, and at last its mean.
+    assert_eq!(checked.sample_wide(at, 0.5), Vec4::new(0.5, 0.5, 0.25, 1.0));
+    assert!((checked.sample_wide(at, 0.3).x - (1.0 - 0.5 * 1.2_f32.log2())).abs() < 1e-5);
+    assert_eq!(checked.sample_wide(at, 1e9), Vec4::new(0.5, 0.5, 0.25, 1.0));
+    // Other filters do not know of widths.
+    let plain = Texture { filter: TextureFilter::Linear, ..checked.clone() };
+    assert_eq!(plain.sample_wide(at, 1e9), plain.sample(at));
+    // Sizes that are no powers of two.
+    let image = Image { width: 3, height: 1, pixels: Pixels::Rgba32F { data: vec![[0.0; 4], [3.0; 4], [6.0; 4]] } };
+    let odd = Texture { image: Arc::new(image), ..checked.clone() };
+    let odd = Texture { levels: Default::default(), ..odd };
+    assert_eq!(odd.sample_wide(at, 1e9), Vec4::splat(3.0));
 }

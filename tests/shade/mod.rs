@@ -1,10 +1,15 @@
 //! The script host: what shaders may say, what they mean, and what is said when they are wrong.
 
+mod attributes;
+mod closures;
 mod errors;
 mod library;
+mod modules;
 mod native;
+mod reference;
 mod shading;
 mod shipped;
+mod textures;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -34,6 +39,7 @@ pub fn scene_with(scripts: &[&str], params: BTreeMap<String, (ParamValue, Option
         image: Arc::new(Image { width: 1, height: 1, pixels: Pixels::Rgba32F { data: vec![[0.5, 0.25, 0.75, 0.5]] } }),
         wrap: [Wrap::Repeat; 2],
         filter: TextureFilter::Linear,
+        levels: Default::default(),
     });
     for (index, text) in scripts.iter().enumerate() {
         let source = Source::new(format!("{}.rhai", ["first", "second", "third"][index.min(2)]), *text);
@@ -79,6 +85,10 @@ pub fn batch(len: usize) -> HitBatch {
         front_facing: vec![true; len],
         pixels_per_unit: vec![100.0; len],
         curvature: vec![0.5; len],
+        footprint: vec![0.01; len],
+        uv_footprint: vec![0.02; len],
+        attribute_set: vec![0; len],
+        attributes: Arc::new(vec![Default::default()]),
         lights: rows()
             .flat_map(|_| {
                 [

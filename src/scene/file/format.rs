@@ -135,7 +135,7 @@ pub(super) struct Gradient {
 #[derive(Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct BackgroundImage {
-    /// Path of the image: PNG, JPEG or Radiance HDR.
+    /// Path of the image: PNG, JPEG, Radiance HDR or OpenEXR.
     pub image: String,
     /// Multiplies the image.
     #[serde(default = "one")]
@@ -341,6 +341,24 @@ pub(super) enum Param {
     Text(String),
     /// A texture.
     Texture(Texture),
+    /// A texture, in other words.
+    File(TextureFile),
+}
+
+/// An attribute's value.
+#[derive(Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(untagged)]
+pub(super) enum Attribute {
+    /// A switch.
+    Bool(bool),
+    /// A whole number.
+    Int(i64),
+    /// A number.
+    Float(#[schemars(range(min = -BRIGHT, max = BRIGHT))] f64),
+    /// A vector or a colour.
+    Vector(#[schemars(length(min = 2, max = 4), inner(range(min = -BRIGHT, max = BRIGHT)))] Vec<f64>),
+    /// A text.
+    Text(String),
 }
 
 /// A texture: an image and how to look it up.
@@ -358,6 +376,34 @@ pub(super) struct Texture {
     /// Whether the image holds sRGB colours; false for widths, masks and other data.
     #[serde(default = "yes")]
     pub srgb: bool,
+}
+
+/// A texture: an image and how to look it up.
+#[derive(Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct TextureFile {
+    /// Path of the image: PNG, JPEG, Radiance HDR or OpenEXR.
+    pub file: String,
+    /// What happens outside 0 … 1, in u and in v.
+    #[serde(default)]
+    pub wrap: Wrap,
+    /// How pixels are interpolated.
+    #[serde(default)]
+    pub filter: TextureFilter,
+    /// How colours are encoded: "linear" for widths, masks and other data. Floats are always linear.
+    #[serde(default)]
+    pub color: Encoding,
+}
+
+/// How the colours of an image are encoded.
+#[derive(Clone, Copy, Debug, Default, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum Encoding {
+    /// As for screens.
+    #[default]
+    Srgb,
+    /// As they are.
+    Linear,
 }
 
 /// What happens outside 0 … 1.
@@ -382,6 +428,8 @@ pub(super) enum TextureFilter {
     /// Bilinear.
     #[default]
     Linear,
+    /// Bilinear in smaller images that fit the width of a pixel: calm where the texture is far away.
+    Mipmap,
 }
 
 /// A model or a built-in shape with a place in the world.
@@ -430,6 +478,9 @@ pub(super) struct Object {
     pub lines: bool,
     /// Whether the lights of a model are used. Default: true if this file has no `[[lights]]`.
     pub lights: Option<bool>,
+    /// Values that shaders ask for with `hit.attribute("name", default)`.
+    #[serde(default)]
+    pub attributes: BTreeMap<String, Attribute>,
 }
 
 /// A built-in shape.

@@ -18,6 +18,7 @@ use super::report::Report;
 use crate::diag::nearest;
 use crate::files::FileStore;
 use crate::math::{Vec2, Vec3, Vec4};
+use crate::scene::attributes::{Attribute, AttributeSet};
 use crate::scene::material::Script;
 use crate::scene::texture::{TextureFilter, Wrap};
 use crate::shade::builtin;
@@ -124,6 +125,35 @@ pub(super) fn read(
     extra
 }
 
+/// The attributes that extras hold beside what is meant for Tusche: numbers, arrays of two to four numbers, texts and
+/// switches. Other values are left to whoever wrote them.
+pub(super) fn attributes(extras: &Extras) -> AttributeSet {
+    let record = extras.as_ref().and_then(|extras| serde_json::from_str::<Map<String, Value>>(extras.get()).ok());
+    let entries = record.into_iter().flatten().filter(|(key, _)| key != "tusche");
+    entries.filter_map(|(key, value)| Some((key, attribute(&value)?))).collect()
+}
+
+fn attribute(value: &Value) -> Option<Attribute> {
+    match value {
+        Value::Bool(value) => Some(Attribute::Bool(*value)),
+        Value::String(text) => Some(Attribute::Text(text.clone())),
+        Value::Number(number) => match number.as_i64() {
+            Some(whole) => Some(Attribute::Int(whole)),
+            None => Some(Attribute::Float(float(number.as_f64()).ok()?)),
+        },
+        Value::Array(numbers) => {
+            let numbers: Option<Vec<f32>> = numbers.iter().map(|number| float(number.as_f64()).ok()).collect();
+            match numbers?[..] {
+                [x, y] => Some(Attribute::Vec2(Vec2::new(x, y))),
+                [x, y, z] => Some(Attribute::Vec3(Vec3::new(x, y, z))),
+                [x, y, z, w] => Some(Attribute::Vec4(Vec4::new(x, y, z, w))),
+                _ => None,
+            }
+        }
+        Value::Object(_) | Value::Null => None,
+    }
+}
+
 fn unknown(key: &str, known: &[&str]) -> String {
     match nearest(key, known.iter().copied()) {
         Some(near) => format!("unknown key; did you mean `{near}`?"),
@@ -201,10 +231,11 @@ fn texture(record: &Map<String, Value>, folder: &Path) -> Result<TextureFile, St
             ("wrap", Some("clamp"), _) => wrap = Wrap::Clamp,
             ("filter", Some("nearest"), _) => filter = TextureFilter::Nearest,
             ("filter", Some("linear"), _) => filter = TextureFilter::Linear,
+            ("filter", Some("mipmap"), _) => filter = TextureFilter::Mipmap,
             ("texture", ..) => return Err("texture: expected the path of an image".into()),
             ("srgb", ..) => return Err("srgb: expected true or false".into()),
             ("wrap", ..) => return Err("wrap: expected \"repeat\", \"mirror\" or \"clamp\"".into()),
-            ("filter", ..) => return Err("filter: expected \"nearest\" or \"linear\"".into()),
+            ("filter", ..) => return Err("filter: expected \"nearest\", \"linear\" or \"mipmap\"".into()),
             _ => return Err(format!("{key}: {}", unknown(key, &["texture", "srgb", "wrap", "filter"]))),
         }
     }

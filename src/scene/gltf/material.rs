@@ -17,6 +17,7 @@ use super::texture::Textures;
 use crate::diag::Span;
 use crate::files::FileStore;
 use crate::math::{Affine2, Vec2, Vec3, portable};
+use crate::scene::attributes::AttributeSet;
 use crate::scene::material::{ParamValue, Script};
 use crate::scene::texture::TextureRef;
 use crate::shade::builtin;
@@ -31,6 +32,8 @@ pub(super) struct Draft {
     pub params: BTreeMap<String, (ParamValue, Option<Span>)>,
     pub priority: Option<i32>,
     pub double_sided: bool,
+    /// Of the material's extras.
+    pub attributes: AttributeSet,
 }
 
 /// The uv set that a material's normal texture uses, if it has one.
@@ -63,14 +66,15 @@ impl Drafts<'_> {
         if use_vertex_color {
             params.insert("use_vertex_color".into(), (ParamValue::Bool(true), None));
         }
-        Some(Draft { name, script: default_script()?, params, priority: None, double_sided: false })
+        let attributes = AttributeSet::new();
+        Some(Draft { name, script: default_script()?, params, priority: None, double_sided: false, attributes })
     }
 
     /// The draft of a node's shader, which replaces the materials of its mesh. `None` if its extras name none.
     pub fn of_node(&mut self, name: String, look: Look) -> Option<Draft> {
         let script = look.shader?;
         let params = look.params.into_iter().map(|(key, value)| (key, (self.value(value, &name), None))).collect();
-        Some(Draft { name, script, params, priority: None, double_sided: true })
+        Some(Draft { name, script, params, priority: None, double_sided: true, attributes: AttributeSet::new() })
     }
 
     /// The draft of `materials[index]`.
@@ -96,7 +100,8 @@ impl Drafts<'_> {
             params.insert(key, (value, None));
         }
         let script = extra.look.shader.or_else(default_script)?;
-        Some(Draft { name, script, params, priority: extra.priority, double_sided: json.double_sided })
+        let attributes = extras::attributes(&json.extras);
+        Some(Draft { name, script, params, priority: extra.priority, double_sided: json.double_sided, attributes })
     }
 
     fn value(&mut self, param: Param, material: &str) -> ParamValue {

@@ -20,6 +20,7 @@ use crate::diag::{Diagnostic, Diagnostics};
 use crate::files::FileStore;
 use crate::math::DAffine3;
 use crate::scene::camera::Camera;
+use crate::scene::attributes::AttributeSet;
 use crate::scene::ids::{MaterialId, MeshId, TextureId};
 use crate::scene::light::Light;
 use crate::scene::material::{Material, ParamValue};
@@ -49,6 +50,7 @@ struct Part {
     world_from_object: DAffine3,
     priority: Option<i32>,
     lines: bool,
+    attributes: AttributeSet,
 }
 
 /// A glTF mesh as one or more nodes show it.
@@ -181,6 +183,8 @@ impl Walk<'_> {
         let json = &document.root.nodes[node];
         let place = format!("nodes[{node}]");
         let extra = extras::read(&json.extras, On::Node, &place, &document.folder, self.files, report);
+        let mut attributes = extras::attributes(&document.root.meshes[mesh].extras);
+        attributes.extend(extras::attributes(&json.extras));
         let local = &self.locals[node];
         let (Some(deformation), Some(instances)) = (
             Deformation::of_node(document, node, local, self.model_from_nodes, report),
@@ -218,6 +222,7 @@ impl Walk<'_> {
                 world_from_object,
                 priority: self.placement.priority.or(priority),
                 lines: self.placement.lines && lines.unwrap_or(true),
+                attributes: attributes.clone(),
             });
         }
     }
@@ -383,14 +388,18 @@ impl Model {
             .drafts
             .into_iter()
             .map(|draft| {
-                let Draft { name, script, mut params, priority, double_sided } = draft;
+                let Draft { name, script, mut params, priority, double_sided, attributes } = draft;
                 for (value, _) in params.values_mut() {
                     if let ParamValue::Texture(reference) = value {
                         reference.texture = textures[reference.texture.index()];
                     }
                 }
                 let script = into.add_script(script);
-                into.add_material(Material { name, script, params, priority, double_sided, span: None })
+                let id = into.add_material(Material { name, script, params, priority, double_sided, span: None });
+                if !attributes.is_empty() {
+                    into.attributes.materials.insert(id, attributes);
+                }
+                id
             })
             .collect();
         let meshes: Vec<(MeshId, usize)> = self
@@ -402,9 +411,9 @@ impl Model {
             })
             .collect();
         let first = into.objects.len();
-        into.objects.extend(self.parts.into_iter().map(|part| {
+        for part in self.parts {
             let (mesh, slots) = meshes[part.mesh];
-            Object {
+            let id = into.add_object(Object {
                 name: part.name,
                 mesh,
                 materials: match placement.material {
@@ -416,8 +425,9 @@ impl Model {
                 visible_to: placement.visible_to,
                 lines: part.lines,
                 span: placement.span.clone(),
-            }
-        }));
+            });
+            into.attributes.extend_object(id, part.attributes);
+        }
         Imported { objects: first..into.objects.len(), cameras: self.cameras, lights: self.lights, warnings }
     }
 }

@@ -1,7 +1,7 @@
 //! The textures that the used materials ask for, decoded in parallel, each image once per encoding.
 
 use std::path::PathBuf;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use gltf::json;
 use gltf::json::texture::{MagFilter, WrappingMode};
@@ -122,7 +122,7 @@ impl Textures {
             .into_iter()
             .filter_map(|texture| {
                 let (name, image) = images[texture.image].clone()?;
-                Some(Texture { name, image, wrap: texture.wrap, filter: texture.filter })
+                Some(Texture { name, image, wrap: texture.wrap, filter: texture.filter, levels: OnceLock::new() })
             })
             .collect()
     }

@@ -9,8 +9,8 @@ use super::inputs;
 use super::interval::Interval;
 use super::operators;
 use super::value::{Abstract, Field, Record, Shape, Vector};
-use super::walk::{Flow, Stop, Walker, place};
-use super::{Finding, nearest_hint};
+use super::walk::{Flow, Stop, Walker};
+use super::nearest_hint;
 use crate::shade::names::InputSet;
 
 /// One link of a chain.
@@ -219,6 +219,9 @@ impl Walker<'_> {
         position: Position,
     ) -> Flow<(Abstract, Option<Abstract>)> {
         let name = call.name.as_str();
+        if let (Shape::Closure(closure), "call") = (&target.shape, name) {
+            return self.closure_call(&Rc::clone(closure), arguments, position).map(|value| (value, None));
+        }
         if super::expressions::BEYOND.contains(&name) {
             return self.give_up(position, &format!("`{name}`"));
         }
@@ -274,9 +277,8 @@ impl Walker<'_> {
                 if record.is_params {
                     let message = format!("there is no parameter `{name}`");
                     if record.fields.is_empty() {
-                        let place = place(position);
                         let hint = Some(format!("declare it: fn params() {{ #{{ {name}: 1.0 }} }}"));
-                        self.findings.insert(Finding { place, message, hint });
+                        self.find_fault(position, message, hint);
                     } else {
                         self.unknown_name(message, name, record.fields.keys().map(|key| &**key), position);
                     }
@@ -294,7 +296,7 @@ impl Walker<'_> {
         position: Position,
     ) {
         let hint = nearest_hint(name, candidates);
-        self.findings.insert(Finding { place: place(position), message, hint });
+        self.find_fault(position, message, hint);
     }
 
     fn with_property(&mut self, target: &Abstract, name: &str, item: Abstract, position: Position) -> Flow<Abstract> {
@@ -302,7 +304,7 @@ impl Walker<'_> {
             Shape::Hit => self.give_up(position, "an assignment to `hit`"),
             Shape::Record(record) => {
                 let mut record = Record::clone(record);
-                record.fields.insert(name.into(), Field::always(item, place(position)));
+                record.fields.insert(name.into(), Field::always(item, self.place(position)));
                 Ok(self.constant(Shape::Record(Rc::new(record))))
             }
             Shape::Vector(vector) => match swizzle(name, vector.channels.len()) {

@@ -2,11 +2,13 @@
 
 use std::rc::Rc;
 
-use rhai::{Dynamic, Expr, FnCallExpr, Position};
+use rhai::{Dynamic, Expr, FnCallExpr, Position, Stmt};
 
 use super::interval::Interval;
 use super::value::{Abstract, Field, Record, Shape};
-use super::walk::{Call, Flow, ScriptFunction, Stop, Variable, Walker, place};
+use super::walk::{Call, Flow, Stop, Variable, Variables, Walker};
+use crate::shade::closures;
+use crate::shade::script::ScriptFunction;
 
 /// Functions of the script engine that run or make code, or look at variables by name.
 pub(super) const BEYOND: [&str; 8] = ["eval", "Fn", "call", "curry", "exit", "is_def_var", "is_def_fn", "is_shared"];
@@ -15,6 +17,9 @@ impl<'a> Walker<'a> {
     /// Evaluates an expression.
     pub(super) fn expression(&mut self, expression: &Expr) -> Flow<Abstract> {
         self.step(expression.position())?;
+        if let Some(closure) = closures::literal(expression) {
+            return self.closure(&closure, expression.position());
+        }
         match expression {
             Expr::BoolConstant(b, _) => Ok(self.constant(Shape::Bool(Some(*b)))),
             Expr::IntegerConstant(n, _) => Ok(self.constant(Shape::Int(*n, *n))),
@@ -36,7 +41,7 @@ impl<'a> Walker<'a> {
                 let mut record = Record::default();
                 for (key, value) in &map.0 {
                     let value = self.expression(value)?;
-                    record.fields.insert(key.name.as_str().into(), Field::always(value, place(key.pos)));
+                    record.fields.insert(key.name.as_str().into(), Field::always(value, self.place(key.pos)));
                 }
                 Ok(self.constant(Shape::Record(Rc::new(record))))
             }
@@ -80,7 +85,7 @@ impl<'a> Walker<'a> {
             let mut record = Record::default();
             for (key, value) in map.iter() {
                 let value = self.literal(value, position)?;
-                record.fields.insert(key.as_str().into(), Field::always(value, place(position)));
+                record.fields.insert(key.as_str().into(), Field::always(value, self.place(position)));
             }
             Shape::Record(Rc::new(record))
         } else if let Some(range) = value.read_lock::<std::ops::Range<i64>>() {
@@ -106,7 +111,7 @@ impl<'a> Walker<'a> {
         if let Some(variable) = self.find(name) {
             return Ok(variable.value.clone());
         }
-        if self.functions.keys().any(|(function, _)| function.as_str() == name) {
+        if self.functions.values().any(|function| function.name == name) {
             return self.give_up(position, "a function as a value");
         }
         Ok(self.constant(match name {
@@ -165,27 +170,21 @@ impl<'a> Walker<'a> {
         } else {
             self.expressions(&call.args)?
         };
-        if call.is_qualified() {
-            return self.qualified_call(call, &arguments, position);
+        if call.is_qualified() && call.namespace.root() == "global" {
+            return self.give_up(position, "a call through `global`");
         }
         if let Some(function) = self.script_function(name, arguments.len()) {
             return self.script_call(function, arguments, None, position).map(|(value, _)| value);
         }
         let (value, changed) = self.native_call(name, &arguments, position)?;
-        if let (Some(_), Some(first), Some(changed)) = (by_reference, call.args.first(), changed) {
+        if let (Some(variable), Some(first), Some(changed)) = (by_reference, call.args.first(), changed) {
+            // Of a variable that a closure shares, the engine passes a copy; whether it is shared may hang on the path.
+            if self.find(variable).is_some_and(|variable| variable.cell.is_some()) {
+                return self.give_up(position, &format!("`{name}`, which would change a variable that a closure captures,"));
+            }
             self.store(first, changed)?;
         }
         Ok(value)
-    }
-
-    fn qualified_call(&mut self, call: &FnCallExpr, arguments: &[Abstract], position: Position) -> Flow<Abstract> {
-        if call.namespace.root() == "global" {
-            return self.give_up(position, "a call through `global`");
-        }
-        if matches!(call.args.first(), Some(Expr::Variable(..) | Expr::ThisPtr(_))) {
-            return self.give_up(position, "a module's function, which may change its argument,");
-        }
-        Ok(self.unknown(arguments))
     }
 
     /// The script's own function of that name and number of parameters.
@@ -207,22 +206,29 @@ impl<'a> Walker<'a> {
         if !self.may_call() {
             return self.give_up(position, "a function that calls itself, or calls nested this deep");
         }
-        let has_this = this.is_some();
-        let this = this.map(|value| Variable { name: "this".into(), value });
+        let mut variables: Variables = this.into_iter().map(|value| Variable::new("this", value)).collect();
+        let kept = variables.len();
         let parameters = function.parameters.iter().zip(arguments);
-        let parameters = parameters.map(|(name, value)| Variable { name: name.as_str().into(), value });
-        let variables = this.into_iter().chain(parameters).collect();
-        self.calls.push(Call { variables, has_this, ..Call::default() });
-        match self.statements(&function.body) {
+        variables.extend(parameters.map(|(name, value)| Variable::new(name.as_str(), value)));
+        let call = Call { variables, kept, file: function.file, ..Call::default() };
+        let (value, kept) = self.enter(call, &function.body)?;
+        Ok((value, kept.into_iter().next().map(|this| this.value)))
+    }
+
+    /// Walks the body of a function. Gives its value, and the variables that the caller gets back.
+    pub(super) fn enter(&mut self, call: Call, body: &[Stmt]) -> Flow<(Abstract, Variables)> {
+        self.calls.push(call);
+        match self.statements(body) {
             Ok(value) => {
-                let kept = self.call().variables[..usize::from(has_this)].to_vec();
-                self.call().returns.states.push((kept, value));
+                let call = self.call();
+                let kept = call.variables[..call.kept].to_vec();
+                call.returns.states.push((kept, value));
             }
             Err(Stop::Left) => {}
             Err(Stop::GaveUp) => return Err(Stop::GaveUp),
         }
         let Some(left) = self.calls.pop() else { return Err(Stop::GaveUp) };
         let Some((kept, value)) = self.join_exits(left.returns, left.escape) else { return Err(Stop::Left) };
-        Ok((value, kept.into_iter().next().map(|this| this.value)))
+        Ok((value, kept))
     }
 }

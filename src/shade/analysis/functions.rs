@@ -13,6 +13,7 @@ use super::interval::Interval;
 use super::operators;
 use super::value::{Abstract, Shape, Vector};
 use super::walk::{Flow, Walker};
+use crate::shade::names::InputSet;
 
 /// Functions of the script engine that change their first argument.
 const MUTATING: [&str; 38] = [
@@ -75,9 +76,16 @@ impl Walker<'_> {
         let value = match arguments {
             [hit, texture] if hit.shape == Shape::Hit && name == "texture" => self.texture_at_hit(texture),
             [hit, index] if hit.shape == Shape::Hit && name == "light" => self.light(index),
-            [texture, uv] if name == "texture" => {
+            [hit, of, default] if hit.shape == Shape::Hit && name == "attribute" => {
+                self.attribute(of, default, position)?
+            }
+            [text, _, ..] if name == "texture" && matches!(text.shape, Shape::Text(_)) => {
+                self.named_texture(arguments, position)?
+            }
+            [texture, uv, width @ ..] if name == "texture" && width.len() < 2 => {
                 let shape = self.texture_bounds(&texture.shape);
-                let inputs = self.escape(texture) | self.escape(uv);
+                let width: InputSet = width.iter().map(|width| self.escape(width)).collect();
+                let inputs = self.escape(texture) | self.escape(uv) | width;
                 self.value(shape, inputs)
             }
             [a, b] if operators::is_binary(name) => self.binary(name, a, b),
@@ -271,6 +279,36 @@ fn pattern(name: &str, arguments: &[&Shape]) -> Option<Shape> {
         ("hash_color", [_]) => color(Interval::UNIT),
         ("value_noise" | "cell_id", [_]) => Some(Shape::Float(Interval::UNIT.or_nan(has_nan))),
         ("gradient_noise", [_]) => Some(Shape::Float(Interval::within(1.0).or_nan(has_nan))),
+        ("worley", [_]) => {
+            let distances = [Interval::new(0.0, 1.5), Interval::new(0.0, 2.0)];
+            Some(Shape::Vector(Vector::new(distances.map(|distance| distance.or_nan(has_nan)))))
+        }
+        ("stripes", [_, _] | [_, _, _])
+        | ("checker", [_] | [_, _])
+        | ("dots" | "hatch" | "cross_hatch", [_, _] | [_, _, _]) => {
+            // Sums of what is not huge do not overflow.
+            let is_tame = arguments.iter().all(|shape| shape.range().is_some_and(|range| range.size() < 1e30));
+            Some(Shape::Float(Interval::UNIT.or_nan(has_nan || !is_tame)))
+        }
+        ("rotate", [Shape::Vector(v), angle]) if v.channels.len() == 2 => {
+            let length = v.length * 1.000_01;
+            let is_tame = !has_nan && length < 1e30 && angle.number()?.is_finite();
+            let channel = if is_tame { Interval::within(length) } else { Interval::ANY };
+            Some(Shape::Vector(Vector::new([channel; 2])))
+        }
+        ("hsl", [hue, saturation, lightness]) => {
+            let (h, s, l) = (number(hue), number(saturation), number(lightness));
+            let unit = |x: Interval| x.low >= 0.0 && x.high <= 1.0;
+            let is_color = !has_nan && h.size() < 1e30 && unit(s) && unit(l);
+            color(if is_color { Interval::new(-1e-6, 1.000_001) } else { Interval::ANY })
+        }
+        ("srgb_from_rgb", [_]) => color(Interval::new(0.0, 1.000_001).or_nan(has_nan)),
+        ("temperature", [_]) => color(Interval::UNIT.or_nan(has_nan)),
+        ("hsl_from_rgb" | "oklab" | "oklab_from_rgb" | "oklch" | "oklch_from_rgb" | "mix_oklab", _) => color(Interval::ANY),
+        ("fbm", [point, _, _, _]) => {
+            let nan = point.range().is_none_or(|range| range.nan || range.size() > 1e30);
+            Some(Shape::Float(Interval::within(1.0).or_nan(nan)))
+        }
         ("fbm", [point, _]) => {
             let nan = point.range().is_none_or(|range| range.nan);
             Some(Shape::Float(Interval::within(1.0).or_nan(nan)))

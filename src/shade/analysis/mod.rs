@@ -16,6 +16,7 @@
 //! Functions that neither the library nor the script defines are taken to be pure. The walk is bounded in time.
 
 mod chains;
+mod closure;
 mod expressions;
 mod functions;
 mod geometry;
@@ -34,12 +35,14 @@ use std::fmt;
 use std::rc::Rc;
 use std::sync::Arc;
 
-use self::value::{Abstract, Field, Record, Shape};
+use self::value::{Abstract, Field, NOWHERE, Place, Record, Shape};
 use self::walk::{Flow, Walker};
-pub(in crate::shade) use self::walk::{Functions, ScriptFunction, functions};
 use super::names::{AOV_PREFIX, InputSet, OutputSet};
+use super::link;
 use super::params::{Params, Value};
+use super::script::{Functions, Program};
 use crate::diag;
+use crate::scene::attributes::AttributeSet;
 use crate::scene::texture::Texture;
 
 /// What is known of one output.
@@ -60,6 +63,8 @@ pub struct OutputFact {
 /// Something in a script that is certainly wrong, or beyond analysis.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Finding {
+    /// Which file it is in: 0 is the script itself, 1 and up are its modules.
+    pub file: usize,
     /// Line and column, both from 1; 0 where the script engine does not know.
     pub place: (usize, usize),
     /// What is wrong, in one sentence without a full stop.
@@ -77,6 +82,8 @@ pub struct Analysis {
     pub outputs: Vec<OutputFact>,
     /// Extra outputs, by name without `aov_`, sorted.
     pub aovs: Vec<(String, OutputFact)>,
+    /// Attributes that code which may run asks for, sorted.
+    pub attributes: Vec<String>,
     /// Parameters that code which may run reads.
     pub parameters: BTreeSet<String>,
     /// Whether the facts are known to be complete. If not, all inputs are assumed read and all outputs written.
@@ -91,9 +98,30 @@ pub struct Analysis {
 /// the scene's table, which texture parameters point into.
 #[must_use]
 pub fn analyse(ast: &rhai::AST, params: &Params, textures: &[Arc<Texture>]) -> Analysis {
-    let functions = walk::functions(ast);
-    let mut walker = Walker::new(&functions, textures);
-    match walk_surface(&mut walker, ast, params) {
+    let functions = link::functions(ast);
+    analyse_functions(&functions, Some(&("surface".to_owned(), 2)), params, textures, &[])
+}
+
+/// The same for a program.
+/// `attributes` are the sets that hits of the material can have.
+pub(super) fn analyse_program(
+    program: &Program,
+    params: &Params,
+    textures: &[Arc<Texture>],
+    attributes: &[&AttributeSet],
+) -> Analysis {
+    analyse_functions(&program.functions, program.surface_key(), params, textures, attributes)
+}
+
+fn analyse_functions(
+    functions: &Functions,
+    surface: Option<&(String, usize)>,
+    params: &Params,
+    textures: &[Arc<Texture>],
+    attributes: &[&AttributeSet],
+) -> Analysis {
+    let mut walker = Walker::new(functions, textures, attributes);
+    match walk_surface(&mut walker, surface, params) {
         Ok(Some(record)) => {
             let mut analysis = Analysis::empty(walker.inputs);
             for (key, field) in &record.fields {
@@ -102,10 +130,15 @@ pub fn analyse(ast: &rhai::AST, params: &Params, textures: &[Arc<Texture>]) -> A
             analysis.aovs.sort_by(|a, b| a.0.cmp(&b.0));
             analysis.parameters = walker.parameters.iter().map(|name| (**name).to_owned()).collect();
             analysis.findings = walker.findings.into_iter().collect();
+            analysis.attributes = walker.attributes.into_iter().collect();
             analysis
         }
         // No path ends without an error, so nothing is ever written.
-        Ok(None) => Analysis { findings: walker.findings.into_iter().collect(), ..Analysis::empty(walker.inputs) },
+        Ok(None) => Analysis {
+            findings: walker.findings.into_iter().collect(),
+            attributes: walker.attributes.into_iter().collect(),
+            ..Analysis::empty(walker.inputs)
+        },
         Err(_) => Analysis { blame: walker.blame, findings: walker.findings.into_iter().collect(), ..unknown() },
     }
 }
@@ -123,19 +156,20 @@ pub fn unknown() -> Analysis {
 }
 
 /// The record that `surface` returns; `None` if it never returns.
-fn walk_surface(walker: &mut Walker, ast: &rhai::AST, params: &Params) -> Flow<Option<Rc<Record>>> {
+fn walk_surface(
+    walker: &mut Walker,
+    surface: Option<&(String, usize)>,
+    params: &Params,
+) -> Flow<Option<Rc<Record>>> {
     let start = rhai::Position::NONE;
-    if let Some(statement) = ast.statements().first() {
-        return walker.give_up(statement.position(), "code outside of functions");
-    }
-    let Some(function) = walker.script_function("surface", 2) else {
+    let Some(function) = surface.and_then(|(name, count)| walker.script_function(name, *count)) else {
         return walker.give_up(start, "a script without `surface(hit, p)`");
     };
     let mut fields = Record { is_params: true, ..Record::default() };
     for (name, value) in params.0.iter() {
         let shape = Shape::from_value(value, walker.textures.len(), &mut || walker.fresh());
         let value = Abstract::constant(shape, walker.fresh());
-        fields.fields.insert(name.as_str().into(), Field::always(value, (0, 0)));
+        fields.fields.insert(name.as_str().into(), Field::always(value, NOWHERE));
     }
     let parameters = Abstract::constant(Shape::Record(Rc::new(fields)), walker.fresh());
     let arguments = vec![walker.constant(Shape::Hit), parameters];
@@ -194,7 +228,7 @@ impl Analysis {
                         all.join(", ")
                     ))
                 });
-                walker.findings.insert(Finding { place: field.place, message, hint });
+                walker.findings.insert(Finding::new(field.place, message, hint));
             }
         }
     }
@@ -239,6 +273,9 @@ impl fmt::Display for Analysis {
     /// One line for the inputs, one for each output that may be written, one for each finding.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "inputs: {}", InputNames(self.inputs))?;
+        if !self.attributes.is_empty() {
+            writeln!(f, "attributes: {}", self.attributes.join(" "))?;
+        }
         if !self.complete {
             f.write_str("incomplete")?;
             if let Some(blame) = &self.blame {
@@ -263,9 +300,18 @@ impl fmt::Display for Analysis {
     }
 }
 
+impl Finding {
+    fn new((file, line, column): Place, message: String, hint: Option<String>) -> Self {
+        Self { file, place: (line, column), message, hint }
+    }
+}
+
 impl fmt::Display for Finding {
-    /// `line:column: message (hint)`
+    /// `line:column: message (hint)`; in modules with the number of the file before it.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.file > 0 {
+            write!(f, "module {}:", self.file)?;
+        }
         write!(f, "{}:{}: {}", self.place.0, self.place.1, self.message)?;
         match &self.hint {
             Some(hint) => write!(f, " ({hint})"),

@@ -114,7 +114,7 @@ impl Walker<'_> {
         let call = self.call();
         call.escape |= control;
         call.loops.iter_mut().for_each(|left| left.escape |= control);
-        let kept = call.variables[..usize::from(call.has_this)].to_vec();
+        let kept = call.variables[..call.kept].to_vec();
         call.returns.states.push((kept, value));
         Err(Stop::Left)
     }

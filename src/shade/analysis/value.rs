@@ -15,8 +15,14 @@ use crate::scene::texture::TextureRef;
 use crate::shade::names::InputSet;
 use crate::shade::params::Value;
 
-/// A position in a script: line and column, both from 1 (0 where the script engine does not know).
-pub(crate) type Place = (usize, usize);
+/// A position in a program: its file, line and column; the last two from 1 (0 where the script engine does not know).
+pub(crate) type Place = (usize, usize, usize);
+
+/// Nowhere in a program.
+pub(crate) const NOWHERE: Place = (0, 0, 0);
+
+/// A variable that a closure captures is shared: this names it, whatever code sees it.
+pub(crate) type Cell = Identity;
 
 /// Names one evaluation of one expression.
 pub(crate) type Identity = u64;
@@ -58,8 +64,19 @@ pub(crate) enum Shape {
     },
     /// The argument of `surface`.
     Hit,
+    /// A closure that a variable holds.
+    Closure(Rc<Closure>),
     /// What is known is only on which inputs it depends. Never holds a [`Shape::Hit`] whose inputs are not counted.
     Unknown,
+}
+
+/// A closure: its function, and the captured variables.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Closure {
+    /// Its name for the engine, and how many parameters it has with the captured variables.
+    pub function: (String, usize),
+    /// Name and cell of each, in the order of the parameters.
+    pub captured: Vec<(Rc<str>, Cell)>,
 }
 
 /// Two to four channels.
@@ -142,7 +159,7 @@ impl Shape {
                     .iter()
                     .map(|(key, value)| {
                         let value = Abstract::constant(Self::from_value(value, textures, fresh), fresh());
-                        (key.as_str().into(), Field::always(value, (0, 0)))
+                        (key.as_str().into(), Field::always(value, NOWHERE))
                     })
                     .collect();
                 Self::Record(Rc::new(Record { fields, is_params: false }))
@@ -244,7 +261,7 @@ impl Abstract {
                 record.fields.values().map(|field| field.value.all_inputs() | field.presence).collect()
             }
             Shape::Array(items) => items.iter().map(Self::all_inputs).collect(),
-            Shape::Hit => InputSet::all(),
+            Shape::Hit | Shape::Closure(_) => InputSet::all(),
             _ => InputSet::empty(),
         };
         self.inputs | parts
@@ -253,7 +270,8 @@ impl Abstract {
     /// Whether `hit` itself is part of it.
     pub fn holds_hit(&self) -> bool {
         match &self.shape {
-            Shape::Hit => true,
+            // What it captures may hold it.
+            Shape::Hit | Shape::Closure(_) => true,
             Shape::Record(record) => record.fields.values().any(|field| field.value.holds_hit()),
             Shape::Array(items) => items.iter().any(Self::holds_hit),
             _ => false,
@@ -343,6 +361,7 @@ impl Join<'_> {
         match (a, b) {
             (Shape::Unit, Shape::Unit) => Shape::Unit,
             (Shape::Hit, Shape::Hit) => Shape::Hit,
+            (Shape::Closure(x), Shape::Closure(y)) if x == y => Shape::Closure(Rc::clone(x)),
             (Shape::Bool(x), Shape::Bool(y)) => Shape::Bool(x.filter(|_| x == y)),
             (Shape::Text(x), Shape::Text(y)) => Shape::Text(x.clone().filter(|_| x == y)),
             (Shape::Texture(x), Shape::Texture(y)) => Shape::Texture(x.filter(|_| x == y)),

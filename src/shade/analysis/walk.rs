@@ -4,12 +4,14 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
 use std::sync::Arc;
 
-use rhai::{AST, ASTNode, Position, Stmt};
+use rhai::Position;
 
 use super::Finding;
-use super::value::{Abstract, Identity, Join, Place, Shape};
+use super::value::{Abstract, Cell, Identity, Join, Place, Shape};
+use crate::scene::attributes::AttributeSet;
 use crate::scene::texture::Texture;
 use crate::shade::names::InputSet;
+use crate::shade::script::Functions;
 
 /// Expressions that a walk may evaluate before it gives up: bounds its time.
 const MAX_STEPS: u32 = 400_000;
@@ -38,6 +40,15 @@ pub(super) type Flow<T> = Result<T, Stop>;
 pub(super) struct Variable {
     pub name: Rc<str>,
     pub value: Abstract,
+    /// Which shared variable it is, once a closure has captured it.
+    pub cell: Option<Cell>,
+}
+
+impl Variable {
+    /// A variable that nothing shares.
+    pub fn new(name: impl Into<Rc<str>>, value: Abstract) -> Self {
+        Self { name: name.into(), value, cell: None }
+    }
 }
 
 /// All variables of a call, outermost block first; a later one shadows an earlier one of the same name.
@@ -69,52 +80,24 @@ pub(super) struct Call {
     pub variables: Variables,
     pub loops: Vec<Loop>,
     pub returns: Exits,
-    /// Whether the first variable is `this`, which the caller gets back.
-    pub has_this: bool,
+    /// How many of the first variables the caller gets back: `this`, or what a closure captures.
+    pub kept: usize,
+    /// Which of the program's files the code stands in.
+    pub file: usize,
     /// What the branches around the current code depend on.
     pub branches: InputSet,
     /// What leaving this call early depends on.
     pub escape: InputSet,
 }
 
-/// A function that the script defines.
-pub(in crate::shade) struct ScriptFunction {
-    pub parameters: Vec<String>,
-    pub body: Vec<Stmt>,
-    /// Whether it is for one type of `this` only.
-    pub is_typed: bool,
-}
-
-/// Functions of a script by name and number of parameters.
-pub(in crate::shade) type Functions = BTreeMap<(String, usize), ScriptFunction>;
-
-/// The functions of a script.
-pub(in crate::shade) fn functions(ast: &AST) -> Functions {
-    let mut functions = Functions::new();
-    for function in ast.iter_functions() {
-        let count = function.params.len();
-        // The engine does not let bodies out, but walks them. (Its `clone_functions_only_filtered` would copy all.)
-        let mut alone = ast.clone_functions_only();
-        alone.retain_functions(|_, _, name, n| name == function.name && n == count);
-        let mut body = Vec::new();
-        alone.walk(&mut |path: &[ASTNode]| {
-            if let [ASTNode::Stmt(statement)] = path {
-                body.push((*statement).clone());
-            }
-            true
-        });
-        let parameters = function.params.iter().map(|name| (*name).to_owned()).collect();
-        let is_typed = function.this_type.is_some();
-        let entry = functions.entry((function.name.to_owned(), count));
-        entry.and_modify(|other| other.is_typed = true).or_insert(ScriptFunction { parameters, body, is_typed });
-    }
-    functions
-}
-
 /// The walk over one material's shader.
 pub(super) struct Walker<'a> {
     pub functions: &'a Functions,
     pub textures: &'a [Arc<Texture>],
+    /// The sets of attributes that hits of the material can have.
+    pub attribute_sets: &'a [&'a AttributeSet],
+    /// Names of attributes that were asked for.
+    pub attributes: BTreeSet<String>,
     /// Bounds of the textures that were looked up, which cost a look at all pixels, by their index.
     pub texture_bounds: BTreeMap<usize, Shape>,
     /// The innermost call is the last.
@@ -131,16 +114,13 @@ pub(super) struct Walker<'a> {
     steps: u32,
 }
 
-/// A position of the script engine as line and column.
-pub(super) fn place(position: Position) -> Place {
-    (position.line().unwrap_or(0), position.position().unwrap_or(0))
-}
-
 impl<'a> Walker<'a> {
-    pub fn new(functions: &'a Functions, textures: &'a [Arc<Texture>]) -> Self {
+    pub fn new(functions: &'a Functions, textures: &'a [Arc<Texture>], attribute_sets: &'a [&'a AttributeSet]) -> Self {
         Self {
             functions,
             textures,
+            attribute_sets,
+            attributes: BTreeSet::new(),
             texture_bounds: BTreeMap::new(),
             calls: vec![Call::default()],
             inputs: InputSet::empty(),
@@ -150,6 +130,18 @@ impl<'a> Walker<'a> {
             next_identity: 0,
             steps: 0,
         }
+    }
+
+    /// A position of the script engine in the code that is being walked.
+    pub fn place(&self, position: Position) -> Place {
+        let file = self.calls.last().map_or(0, |call| call.file);
+        (file, position.line().unwrap_or(0), position.position().unwrap_or(0))
+    }
+
+    /// Notes what is certainly wrong.
+    pub fn find_fault(&mut self, position: Position, message: String, hint: Option<String>) {
+        let place = self.place(position);
+        self.findings.insert(Finding::new(place, message, hint));
     }
 
     /// A new identity.
@@ -200,7 +192,8 @@ impl<'a> Walker<'a> {
     /// Ends the analysis: the construct at `position` is beyond it.
     pub fn give_up<T>(&mut self, position: Position, what: &str) -> Flow<T> {
         let message = format!("{what} cannot be analysed");
-        self.blame.get_or_insert(Finding { place: place(position), message, hint: None });
+        let place = self.place(position);
+        self.blame.get_or_insert(Finding::new(place, message, None));
         Err(Stop::GaveUp)
     }
 
@@ -243,7 +236,7 @@ impl<'a> Walker<'a> {
 
     /// Adds a variable.
     pub fn declare(&mut self, name: &str, value: Abstract) {
-        self.call().variables.push(Variable { name: name.into(), value });
+        self.call().variables.push(Variable::new(name, value));
     }
 
     /// The value that is one of two, chosen by `control`.
@@ -264,7 +257,11 @@ impl<'a> Walker<'a> {
     pub fn join_variables(&mut self, a: &Variables, b: &Variables, control: InputSet) -> Variables {
         a.iter()
             .zip(b)
-            .map(|(a, b)| Variable { name: Rc::clone(&a.name), value: self.join_values(&a.value, &b.value, control) })
+            .map(|(a, b)| Variable {
+                name: Rc::clone(&a.name),
+                value: self.join_values(&a.value, &b.value, control),
+                cell: a.cell.or(b.cell),
+            })
             .collect()
     }
 
@@ -283,7 +280,7 @@ impl<'a> Walker<'a> {
             let value =
                 Join { control, next_identity: &mut self.next_identity, loop_values, widen }.join(&a.value, &b.value);
             self.note_lost_hit(&value, &a.value, &b.value);
-            next.push(Variable { name: Rc::clone(&a.name), value });
+            next.push(Variable { name: Rc::clone(&a.name), value, cell: a.cell.or(b.cell) });
         }
         next
     }

@@ -10,11 +10,12 @@ use std::sync::Arc;
 use rhai::{ASTFlags, Expr, FnCallExpr, Position, Stmt};
 
 use crate::diag::{Diagnostic, Diagnostics, Source};
-use crate::shade::analysis::walk::{self, ScriptFunction};
+use crate::shade::closures;
 use crate::shade::fault;
 use crate::shade::library;
 use crate::shade::params::MAX_LINE_WIDTH;
 use crate::shade::program::Shader;
+use crate::shade::script::ScriptFunction;
 
 /// The arguments of `surface`, as every example calls them.
 const HIT: &str = "hit";
@@ -22,10 +23,11 @@ const PARAMETERS: &str = "p";
 
 pub(super) fn lint(shader: &Shader) -> Diagnostics {
     let program = &shader.program;
-    let functions = walk::functions(&program.ast);
+    // The functions of modules may serve other scripts.
+    let own = || program.functions.iter().filter(|(_, function)| function.file == 0);
     let mut lint = Lint {
         source: &program.source,
-        functions: functions.keys().map(|(name, _)| name.as_str()).collect(),
+        functions: own().map(|((key, _), _)| key.as_str()).collect(),
         warnings: Diagnostics::default(),
         scope: Vec::new(),
         uses: Uses::default(),
@@ -33,31 +35,33 @@ pub(super) fn lint(shader: &Shader) -> Diagnostics {
         inputs_name: String::new(),
     };
     let mut uses = BTreeMap::new();
-    for ((name, count), function) in &functions {
-        lint.function(name, *count, function);
-        uses.entry(name.as_str()).or_insert_with(Uses::default).extend(std::mem::take(&mut lint.uses));
+    for ((key, count), function) in own() {
+        lint.function(&function.name, *count, function);
+        uses.entry(key.as_str()).or_insert_with(Uses::default).extend(std::mem::take(&mut lint.uses));
     }
     let Lint { keys, mut warnings, .. } = lint;
 
-    if functions.get(&("surface".to_owned(), 2)).is_some_and(|surface| surface.parameters == [PARAMETERS, HIT]) {
+    let surface = program.surface_key().and_then(|key| program.functions.get(key));
+    if surface.is_some_and(|surface| surface.parameters == [PARAMETERS, HIT]) {
         let message = format!("`surface` gets the hit first: here it is called `{PARAMETERS}`");
         let warning = Diagnostic::warning(message).at(program.surface.span.clone());
         warnings.push(warning.hint(format!("write: fn surface({HIT}, {PARAMETERS})")));
     }
     // Functions that neither `surface` nor `params` gets to.
     let mut reached = BTreeSet::new();
-    let mut next = vec!["surface".to_owned(), "params".to_owned()];
+    let from_outside = own().filter(|(_, function)| matches!(function.name.as_str(), "surface" | "params"));
+    let mut next: Vec<String> = from_outside.map(|((key, _), _)| key.clone()).collect();
     while let Some(name) = next.pop() {
         if reached.insert(name.clone()) {
             next.extend(uses.get(name.as_str()).into_iter().flat_map(|uses| uses.0.iter().cloned()));
         }
     }
-    for (name, count) in functions.keys() {
-        let span = program.function_span(name, *count);
-        if !reached.contains(name) && !name.starts_with('_') {
+    for ((key, _), function) in own().filter(|(_, function)| !function.is_closure()) {
+        let (name, span) = (&function.name, function.span.clone());
+        if !reached.contains(key) && !name.starts_with('_') {
             warnings.push(Diagnostic::warning(format!("the function `{name}` is never called")).at(span.clone()));
         }
-        let mut library = library::functions().filter(|known| known.name == name && !known.form.starts_with("hit."));
+        let mut library = library::functions().filter(|known| known.name == *name && !known.form.starts_with("hit."));
         if let Some(hidden) = library.next() {
             let message = format!("this function hides the library's `{}`", hidden.form);
             warnings.push(Diagnostic::warning(message).at(span).hint("give it another name if both are meant"));
@@ -116,11 +120,11 @@ impl Lint<'_> {
     fn function(&mut self, name: &str, count: usize, function: &ScriptFunction) {
         let is_surface = name == "surface" && count == 2;
         self.inputs_name = match function.parameters.first() {
-            Some(first) if is_surface => first.clone(),
+            Some(first) if is_surface => first.to_string(),
             _ => HIT.to_owned(),
         };
-        let argument = |(index, name): (usize, &String)| Variable {
-            name: name.clone(),
+        let argument = |(index, name): (usize, &rhai::ImmutableString)| Variable {
+            name: name.to_string(),
             place: Position::NONE,
             holds: match (name.as_str(), index) {
                 (_, 0) if is_surface => Some("inputs"),
@@ -278,6 +282,9 @@ impl Lint<'_> {
     }
 
     fn expression(&mut self, expression: &Expr) {
+        if let Some(closure) = closures::literal(expression) {
+            self.uses.0.insert(closure.function);
+        }
         match expression {
             Expr::Variable(variable, ..) => self.read(&variable.1),
             Expr::StringConstant(text, _) => {

@@ -30,6 +30,7 @@ use super::analysis::Finding;
 use super::batch::{HitBatch, OutputBatch};
 use super::names::{InputSet, OutputSet};
 use super::params::Params;
+use super::script::Program;
 
 /// A script, lowered for one material.
 #[derive(Debug)]
@@ -57,8 +58,8 @@ impl Kernel {
     ///
     /// # Errors
     /// The construct that cannot be lowered.
-    pub fn new(ast: &rhai::AST, params: &Params, surroundings: Surroundings<'_>) -> Result<Self, Finding> {
-        let lowered = lower::lower(ast, params, surroundings).map_err(|blame| blame.0)?;
+    pub fn new(program: &Program, params: &Params, surroundings: Surroundings<'_>) -> Result<Self, Finding> {
+        let lowered = lower::lower(program, params, surroundings).map_err(|blame| blame.0)?;
         debug_assert_eq!(verify::verify(&lowered), Ok(()), "the lowering made a program that is not well formed");
         Ok(Self { lowered, slices: Mutex::default() })
     }

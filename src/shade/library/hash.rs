@@ -7,8 +7,20 @@ use super::operand::{Operand, Outcome, refuse};
 use crate::math::Vec3;
 
 pub(super) const FUNCTIONS: &[Function] = &[
-    Function { name: "hash", form: "hash(x)", about: "a number 0 ≤ h < 1 that looks random, of a number or vector" },
-    Function { name: "hash_color", form: "hash_color(x)", about: "the same, three unrelated numbers in a vec3" },
+    Function {
+        name: "hash",
+        form: "hash(x)",
+        about: "a number 0 ≤ h < 1 that looks random, of a number or vector",
+        types: "number or vector → number, 0 ≤ h < 1",
+        example: "hash(hit.object_id)",
+    },
+    Function {
+        name: "hash_color",
+        form: "hash_color(x)",
+        about: "the same, three unrelated numbers in a vec3",
+        types: "number or vector → vec3, 0 ≤ h < 1",
+        example: "hash_color(hit.polygon_id)",
+    },
 ];
 
 /// An integer hash with good avalanche: C. Wellons' `lowbias32`.

@@ -6,18 +6,29 @@ use rhai::{Dynamic, Engine, ImmutableString};
 
 use super::Function;
 use super::math::max;
-use super::operand::Outcome;
+use super::operand::{Outcome, kind, refuse};
+use super::parameters::to_script;
 use super::vectors::dot;
 use crate::math::{Vec2, Vec3};
+use crate::scene::attributes::Attribute;
 use crate::shade::batch::{HitBatch, LightSample};
 use crate::shade::fault::Fault;
 use crate::shade::names::InputSet;
+use crate::shade::params::Value;
 
 pub(super) const FUNCTIONS: &[Function] = &[Function {
-    name: "light",
-    form: "hit.light(i)",
-    about: "light number 0 … hit.light_count − 1, with its direction, radiance and visibility",
-}];
+        name: "light",
+        form: "hit.light(i)",
+        about: "light number 0 … hit.light_count − 1, with its direction, radiance and visibility",
+        types: "int → light: `direction` (unit vector towards it), `radiance` (colour), `visibility` (0 … 1)",
+        example: "if hit.light_count > 0 { hit.light(0).visibility } else { 0.0 }",
+    }, Function {
+        name: "attribute",
+        form: "hit.attribute(\"name\", default)",
+        about: "a value of the object's or material's attributes, of the default's type; the default where there is none",
+        types: "text, any of number, vector, text, true or false → the default's type",
+        example: "hit.attribute(\"wear\", 0.0)",
+    }];
 
 /// A row of a batch: the batch is shared, so that a hit costs one small allocation whatever it reads.
 #[derive(Clone, Debug)]
@@ -49,9 +60,34 @@ impl Hit {
         })
     }
 
+    /// An attribute of the object or the material; the default where they have none of this name.
+    fn attribute(&self, name: &str, default: Dynamic) -> Outcome {
+        // Without the column, no hit of the material has what its shader asks for.
+        let set = match self.batch.attribute_set.as_slice() {
+            [] => None,
+            column => Some(self.read("attribute", column)?),
+        };
+        let given = set.and_then(|set| self.batch.attributes.get(set as usize)).and_then(|set| set.get(name));
+        let wanted = Value::from_script(&default);
+        let Some(wanted) = wanted.filter(Value::can_be_attribute) else {
+            let fault = Fault::new(format!("an attribute cannot be {}", kind(&default)));
+            return Err(fault.hint(ATTRIBUTE_TYPES).into());
+        };
+        let Some(given) = given else { return Ok(default) };
+        match given.for_default(&wanted) {
+            Some(value) => Ok(to_script(&value, &[])),
+            None => Err(mistyped_attribute(name, given, &wanted).into()),
+        }
+    }
+
     fn irradiance(&self) -> Outcome<Vec3> {
         let normal = self.read("normal", &self.batch.normal)?;
         Ok(irradiance(normal, self.lights()?))
+    }
+
+    /// How far uv moves across the pixel.
+    pub(super) fn uv_footprint(&self) -> Outcome<f32> {
+        self.read("uv_footprint", &self.batch.uv_footprint)
     }
 
     /// The texture coordinates of a set; (0, 0) where the mesh lacks the set.
@@ -81,6 +117,15 @@ fn unfilled(name: &str) -> Box<rhai::EvalAltResult> {
         .into()
 }
 
+/// What attributes can be.
+pub(in crate::shade) const ATTRIBUTE_TYPES: &str = "attributes are numbers, vectors, texts, and true or false";
+
+/// The fault of an attribute whose value is not of the default's type.
+pub(in crate::shade) fn mistyped_attribute(name: &str, given: &Attribute, wanted: &Value) -> Fault {
+    Fault::new(format!("the attribute `{name}` is {} here, but its default is {}", given.kind(), wanted.kind()))
+        .hint("give the default the type that the scene file or the model gives, or the other way round")
+}
+
 fn unknown(name: &str) -> Fault {
     let fault = Fault::new(format!("there is no input `{name}` on `hit`"));
     fault.propose(name, InputSet::named().map(|(name, _)| name).collect::<Vec<_>>().into_iter())
@@ -106,7 +151,9 @@ pub(super) fn register(engine: &mut Engine) {
         depth,
         front_facing,
         pixels_per_unit,
-        curvature
+        curvature,
+        footprint,
+        uv_footprint
     );
     let id = |hit: &Hit, name: &str, column: &[u32]| hit.read(name, column).map(i64::from);
     engine.register_get("object_id", move |hit: &mut Hit| id(hit, "object_id", &hit.batch.object_id));
@@ -120,6 +167,12 @@ pub(super) fn register(engine: &mut Engine) {
         hit.read("path_kind", &hit.batch.path_kind).map(|kind| kind.name().into())
     });
     engine.register_fn("light", |hit: &mut Hit, index: i64| hit.light(index));
+    engine.register_fn("attribute", |hit: &mut Hit, name: ImmutableString, default: Dynamic| {
+        hit.attribute(&name, default)
+    });
+    engine.register_fn("attribute", |hit: &mut Hit, name: Dynamic, default: Dynamic| -> Outcome {
+        Err(refuse("attribute", &[Dynamic::from(hit.clone()), name, default]))
+    });
     engine.register_indexer_get(|_: &mut Hit, name: ImmutableString| -> Outcome { Err(unknown(&name).into()) });
     engine.register_indexer_set(|_: &mut Hit, name: ImmutableString, _: Dynamic| -> Outcome<()> {
         let known = InputSet::spelled(&name).is_some();

@@ -9,25 +9,31 @@
 pub mod batch;
 pub(in crate::shade) mod color;
 mod compare;
+pub(in crate::shade) mod fractal;
 pub(in crate::shade) mod hash;
 pub(in crate::shade) mod hit;
 pub(in crate::shade) mod math;
 pub(in crate::shade) mod noise;
 mod operand;
 mod parameters;
+pub(in crate::shade) mod pattern;
 mod ramp;
 mod swizzle;
 mod texture;
 mod vectors;
 
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 use rhai::Engine;
 
-pub(super) use hit::Hit;
+use crate::scene::texture::Texture;
+
+pub(super) use hit::{ATTRIBUTE_TYPES, Hit, mistyped_attribute};
 pub(super) use math::CONSTANTS;
 pub(super) use operand::kind;
 pub(super) use parameters::ParameterRecord;
+pub(super) use texture::{texture_name, texture_of, unwritten_path};
 
 /// A function of the library, for messages and reference pages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,6 +44,10 @@ pub struct Function<'a> {
     pub form: &'a str,
     /// What it gives.
     pub about: &'a str,
+    /// Types and ranges of what it takes, `→`, type and range of what it gives.
+    pub types: &'a str,
+    /// An expression in a `surface(hit, p)` that uses it; a number, a vec3, an int, or true or false.
+    pub example: &'a str,
 }
 
 /// All functions of the library, by subject.
@@ -48,6 +58,8 @@ pub fn functions() -> impl Iterator<Item = Function<'static>> + Clone {
         color::FUNCTIONS,
         ramp::FUNCTIONS,
         noise::FUNCTIONS,
+        fractal::FUNCTIONS,
+        pattern::FUNCTIONS,
         hash::FUNCTIONS,
         texture::FUNCTIONS,
         hit::FUNCTIONS,
@@ -58,7 +70,8 @@ pub fn functions() -> impl Iterator<Item = Function<'static>> + Clone {
 }
 
 /// Registers the library. `names` are the parameters that scripts may ask of `p`.
-pub(super) fn register(engine: &mut Engine, names: &BTreeSet<String>) {
+/// `textures` are the scene's.
+pub(super) fn register(engine: &mut Engine, names: &BTreeSet<String>, textures: &[Arc<Texture>]) {
     compare::register(engine);
     vectors::register(engine);
     swizzle::register(engine);
@@ -66,8 +79,10 @@ pub(super) fn register(engine: &mut Engine, names: &BTreeSet<String>) {
     color::register(engine);
     ramp::register(engine);
     noise::register(engine);
+    fractal::register(engine);
+    pattern::register(engine);
     hash::register(engine);
-    texture::register(engine);
+    texture::register(engine, textures);
     hit::register(engine);
     parameters::register(engine, names);
 }

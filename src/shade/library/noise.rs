@@ -18,26 +18,36 @@ pub(super) const FUNCTIONS: &[Function] = &[
         name: "value_noise",
         form: "value_noise(point)",
         about: "smooth noise 0 … 1, lattice values interpolated",
+        types: "vec2 or vec3 → number, 0 … 1",
+        example: "value_noise(hit.position * 4.0)",
     },
     Function {
         name: "gradient_noise",
         form: "gradient_noise(point)",
         about: "Perlin noise −1 … 1, 0 at whole coordinates",
+        types: "vec2 or vec3 → number, −1 … 1",
+        example: "gradient_noise(hit.position * 4.0)",
     },
     Function {
         name: "cellular_noise",
         form: "cellular_noise(point)",
         about: "distance to the nearest of scattered points, 0 … 1.5",
+        types: "vec2 or vec3 → number, 0 … 1.5",
+        example: "cellular_noise(hit.uv * 10.0)",
     },
     Function {
         name: "cell_id",
         form: "cell_id(point)",
         about: "a number 0 … 1 that belongs to the nearest scattered point",
+        types: "vec2 or vec3 → number, 0 … 1",
+        example: "cell_id(hit.uv * 10.0)",
     },
     Function {
         name: "fbm",
         form: "fbm(point, octaves)",
         about: "gradient noise −1 … 1 summed over 1 to 10 octaves, each twice as fine and half as strong",
+        types: "vec2 or vec3, int 1 … 10 → number, −1 … 1",
+        example: "fbm(hit.position, 4)",
     },
 ];
 

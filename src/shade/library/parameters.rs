@@ -34,7 +34,7 @@ impl ParameterRecord {
     }
 }
 
-fn to_script(value: &Value, textures: &[Arc<Texture>]) -> Dynamic {
+pub(super) fn to_script(value: &Value, textures: &[Arc<Texture>]) -> Dynamic {
     match value {
         Value::Unit => Dynamic::UNIT,
         Value::Bool(x) => Dynamic::from_bool(*x),

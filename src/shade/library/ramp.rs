@@ -12,11 +12,15 @@ pub(super) const FUNCTIONS: &[Function] = &[
         name: "ramp",
         form: "ramp(t, [[0.0, a], [1.0, b]])",
         about: "the value at t between stops of a position and a number or vector, linear between them",
+        types: "number, array of [number, number or vector] → number or vector",
+        example: "ramp(hit.uv.y, [[0.0, rgb(0, 0, 0)], [0.4, rgb(1, 0, 0)], [1.0, rgb(1, 1, 1)]])",
     },
     Function {
         name: "ramp",
         form: "ramp(t, stops, kind)",
         about: "the same with the kind \"constant\" (the stop below t), \"linear\" or \"smooth\" (as smoothstep)",
+        types: "number, array of [number, number or vector], text → number or vector",
+        example: "ramp(hit.uv.y, [[0.0, 0.2], [0.5, 1.0]], \"smooth\")",
     },
 ];
 

@@ -11,27 +11,75 @@ use super::operand::{Operand, Outcome, number, refuse};
 use crate::math::{Vec2, Vec3, Vec4};
 
 pub(super) const FUNCTIONS: &[Function] = &[
-    Function { name: "vec2", form: "vec2(x, y)", about: "two numbers; also vec2(x), or a longer vector's first two" },
-    Function { name: "vec3", form: "vec3(x, y, z)", about: "three numbers; also vec3(x), vec3(xy, z), vec3(xyzw)" },
+    Function {
+        name: "vec2",
+        form: "vec2(x, y)",
+        about: "two numbers; also vec2(x), or a longer vector's first two",
+        types: "numbers or vectors → vec2",
+        example: "vec2(hit.position.x, hit.position.z).x",
+    },
+    Function {
+        name: "vec3",
+        form: "vec3(x, y, z)",
+        about: "three numbers; also vec3(x), vec3(xy, z), vec3(xyzw)",
+        types: "numbers or vectors → vec3",
+        example: "vec3(hit.uv, 0.5)",
+    },
     Function {
         name: "vec4",
         form: "vec4(x, y, z, w)",
         about: "four numbers; also vec4(x), vec4(xyz, w), vec4(xy, zw)",
+        types: "numbers or vectors → vec4",
+        example: "vec4(hit.normal, 1.0).w",
     },
-    Function { name: "dot", form: "dot(a, b)", about: "sum of the products of the components" },
-    Function { name: "cross", form: "cross(a, b)", about: "the vec3 at right angles to two others" },
-    Function { name: "length", form: "length(v)", about: "sqrt(dot(v, v))" },
-    Function { name: "distance", form: "distance(a, b)", about: "length(a − b)" },
-    Function { name: "normalize", form: "normalize(v)", about: "v / length(v); a vector of length 0 stays 0" },
+    Function {
+        name: "dot",
+        form: "dot(a, b)",
+        about: "sum of the products of the components",
+        types: "two vectors of one size → number",
+        example: "dot(hit.normal, -hit.incoming)",
+    },
+    Function {
+        name: "cross",
+        form: "cross(a, b)",
+        about: "the vec3 at right angles to two others",
+        types: "vec3, vec3 → vec3",
+        example: "cross(hit.normal, hit.tangent.xyz)",
+    },
+    Function {
+        name: "length",
+        form: "length(v)",
+        about: "sqrt(dot(v, v))",
+        types: "vector → number, 0 or more",
+        example: "length(hit.position)",
+    },
+    Function {
+        name: "distance",
+        form: "distance(a, b)",
+        about: "length(a − b)",
+        types: "two vectors of one size → number, 0 or more",
+        example: "distance(hit.uv, vec2(0.5, 0.5))",
+    },
+    Function {
+        name: "normalize",
+        form: "normalize(v)",
+        about: "v / length(v); a vector of length 0 stays 0",
+        types: "vector → the same, of length 1",
+        example: "normalize(hit.position)",
+    },
     Function {
         name: "reflect",
         form: "reflect(incoming, normal)",
         about: "incoming − normal·(2·dot(normal, incoming))",
+        types: "two vectors of one size → the same",
+        example: "reflect(hit.incoming, hit.normal)",
     },
     Function {
         name: "refract",
         form: "refract(incoming, normal, eta)",
         about: "the refracted direction, eta being the ratio of the indices (from / to); 0 at total reflection",
+        types: "two vectors of one size, number → the same",
+        example: "refract(hit.incoming, hit.normal, 1.0 / 1.5)",
     },
 ];
 

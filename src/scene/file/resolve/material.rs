@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use super::super::document::Node;
 use super::super::format;
@@ -105,30 +105,50 @@ impl Resolver<'_> {
                     _ => continue,
                 },
                 format::Param::Text(text) => ParamValue::Text(text.clone()),
-                format::Param::Texture(texture) => match self.texture(texture, node) {
-                    Some(texture) => ParamValue::Texture(texture),
-                    None => continue,
-                },
+                format::Param::Texture(written) => {
+                    let format::Texture { texture, wrap, filter, srgb } = written;
+                    match self.texture((texture, "texture"), *wrap, *filter, *srgb, node) {
+                        Some(texture) => ParamValue::Texture(texture),
+                        None => continue,
+                    }
+                }
+                format::Param::File(written) => {
+                    let format::TextureFile { file, wrap, filter, color } = written;
+                    let srgb = matches!(color, format::Encoding::Srgb);
+                    match self.texture((file, "file"), *wrap, *filter, srgb, node) {
+                        Some(texture) => ParamValue::Texture(texture),
+                        None => continue,
+                    }
+                }
             };
             resolved.insert(name.clone(), (value, node.map(|node| node.span.clone())));
         }
         resolved
     }
 
-    fn texture(&mut self, written: &format::Texture, node: Option<&Node>) -> Option<TextureRef> {
-        let span = node?.span_of("texture");
-        let path = self.path(&written.texture, &span);
-        let image = self.image(&path, written.srgb, &span)?;
-        let wrap = match written.wrap {
+    /// A texture from a path, with the key that it is written at.
+    fn texture(
+        &mut self,
+        (written, key): (&str, &str),
+        wrap: format::Wrap,
+        filter: format::TextureFilter,
+        srgb: bool,
+        node: Option<&Node>,
+    ) -> Option<TextureRef> {
+        let span = node?.span_of(key);
+        let path = self.path(written, &span);
+        let image = self.image(&path, srgb, &span)?;
+        let wrap = match wrap {
             format::Wrap::Repeat => Wrap::Repeat,
             format::Wrap::Mirror => Wrap::Mirror,
             format::Wrap::Clamp => Wrap::Clamp,
         };
-        let filter = match written.filter {
+        let filter = match filter {
             format::TextureFilter::Nearest => TextureFilter::Nearest,
             format::TextureFilter::Linear => TextureFilter::Linear,
+            format::TextureFilter::Mipmap => TextureFilter::Mipmap,
         };
-        let texture = Texture { name: written.texture.clone(), image, wrap: [wrap; 2], filter };
+        let texture = Texture { name: written.to_owned(), image, wrap: [wrap; 2], filter, levels: OnceLock::new() };
         Some(TextureRef { texture: self.scene.add_texture(texture), uv_set: 0, transform: Affine2::IDENTITY })
     }
 

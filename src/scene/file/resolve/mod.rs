@@ -22,7 +22,7 @@ use crate::math::{DVec3, Vec3};
 use crate::scene::ids::{MaterialId, MeshId};
 use crate::scene::shape::Shape;
 use crate::scene::texture::Image;
-use crate::scene::{SceneBuilder, framing};
+use crate::scene::{SceneBuilder, framing, script_files};
 use camera::ModelCamera;
 pub(super) use material::BUILTIN;
 
@@ -61,6 +61,7 @@ pub(super) fn resolve(file: &SceneFile, node: &Node, context: Context<'_>, fault
     resolver.lines(&file.lines);
     resolver.materials(&file.materials);
     let model_lights = resolver.objects(&file.objects, file.lights.is_empty() && !node.mentions("lights"));
+    script_files::load(&mut resolver.scene, context.files, resolver.faults);
     resolver.lights(&file.lights, model_lights);
     resolver.cameras(file);
     resolver.fill_in();

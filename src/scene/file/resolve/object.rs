@@ -9,9 +9,11 @@ use super::material::about_file;
 use super::transform::world_from_object;
 use super::{ModelCamera, Resolver};
 use crate::diag::{Diagnostic, Diagnostics, Span};
+use crate::math::{Vec2, Vec3, Vec4};
 use crate::scene::Object;
 use crate::scene::gltf::{self, ModelTime, Placement};
-use crate::scene::ids::MeshId;
+use crate::scene::attributes::{Attribute, AttributeSet};
+use crate::scene::ids::{MeshId, ObjectId};
 use crate::scene::light::Light;
 use crate::scene::settings::RayKinds;
 use crate::scene::shape::Shape;
@@ -94,6 +96,9 @@ impl Resolver<'_> {
         match gltf::import(&path, self.context.files, time, &mut self.scene, &placement) {
             Ok(imported) => {
                 self.model_faults(imported.warnings, &span);
+                for index in imported.objects {
+                    self.scene.attributes.extend_object(ObjectId::from_index(index), attributes(object));
+                }
                 let cameras = imported.cameras.into_iter();
                 self.model_cameras.extend(cameras.map(|camera| ModelCamera { model: name.clone(), camera }));
                 imported.lights
@@ -121,7 +126,7 @@ impl Resolver<'_> {
             None => Some(self.default_material()),
         };
         let (Some(mesh), Some(material)) = (mesh, material) else { return };
-        self.scene.add_object(Object {
+        let id = self.scene.add_object(Object {
             name,
             mesh,
             materials: vec![material],
@@ -131,6 +136,7 @@ impl Resolver<'_> {
             lines: object.lines,
             span: Some(node.span.clone()),
         });
+        self.scene.attributes.extend_object(id, attributes(object));
     }
 
     /// The mesh of a shape; shapes with equal parameters share one.
@@ -181,6 +187,24 @@ impl Names {
             }
         }
     }
+}
+
+fn attributes(object: &format::Object) -> AttributeSet {
+    let value = |attribute: &format::Attribute| {
+        Some(match attribute {
+            format::Attribute::Bool(value) => Attribute::Bool(*value),
+            format::Attribute::Int(value) => Attribute::Int(*value),
+            format::Attribute::Float(value) => Attribute::Float(*value as f32),
+            format::Attribute::Vector(values) => match values[..] {
+                [x, y] => Attribute::Vec2(Vec2::new(x as f32, y as f32)),
+                [x, y, z] => Attribute::Vec3(Vec3::new(x as f32, y as f32, z as f32)),
+                [x, y, z, w] => Attribute::Vec4(Vec4::new(x as f32, y as f32, z as f32, w as f32)),
+                _ => return None,
+            },
+            format::Attribute::Text(text) => Attribute::Text(text.clone()),
+        })
+    };
+    object.attributes.iter().filter_map(|(name, attribute)| Some((name.clone(), value(attribute)?))).collect()
 }
 
 fn visible_to(object: &format::Object) -> RayKinds {

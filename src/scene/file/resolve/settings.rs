@@ -65,6 +65,7 @@ impl Resolver<'_> {
             image,
             wrap: [Wrap::Repeat, Wrap::Clamp],
             filter: TextureFilter::Linear,
+            levels: std::sync::OnceLock::new(),
         });
         Background::Image { texture, strength: background.strength as f32 }
     }

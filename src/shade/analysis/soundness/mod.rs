@@ -6,17 +6,19 @@ mod writer;
 
 use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet};
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
 use rhai::{Caches, Dynamic, Engine, Map};
 
 use super::inputs::LIMIT;
-use super::{Analysis, OutputFact, analyse};
+use super::{Analysis, OutputFact, analyse_program};
 use crate::diag::Source;
 use crate::math::{Affine2, Vec2, Vec3, Vec4};
+use crate::scene::attributes::{Attribute, AttributeSet};
 use crate::scene::ids::TextureId;
+use crate::scene::material::ScriptFiles;
 use crate::scene::texture::{Image, Pixels, Texture, TextureFilter, TextureRef, Wrap};
 use crate::shade::batch::{HitBatch, LightSample};
 use crate::shade::host::Host;
@@ -26,7 +28,7 @@ use crate::shade::params::{Params, Value};
 use crate::shade::script::Program;
 
 /// The columns that the scripts read.
-const COLUMNS: [InputSet; 11] = [
+const COLUMNS: [InputSet; 14] = [
     InputSet::POSITION,
     InputSet::NORMAL,
     InputSet::UV,
@@ -38,6 +40,9 @@ const COLUMNS: [InputSet; 11] = [
     InputSet::FRONT_FACING,
     InputSet::PATH_KIND,
     InputSet::LIGHT,
+    InputSet::ATTRIBUTE,
+    InputSet::FOOTPRINT,
+    InputSet::UV_FOOTPRINT,
 ];
 
 /// A hit with one column of another.
@@ -55,6 +60,9 @@ fn with_column(hit: &HitBatch, column: InputSet, other: &HitBatch) -> HitBatch {
         InputSet::FRONT_FACING => hit.front_facing.clone_from(&other.front_facing),
         InputSet::PATH_KIND => hit.path_kind.clone_from(&other.path_kind),
         InputSet::LIGHT => hit.lights.clone_from(&other.lights),
+        InputSet::FOOTPRINT => hit.footprint.clone_from(&other.footprint),
+        InputSet::UV_FOOTPRINT => hit.uv_footprint.clone_from(&other.uv_footprint),
+        InputSet::ATTRIBUTE => hit.attribute_set.clone_from(&other.attribute_set),
         _ => unreachable!("not in COLUMNS"),
     }
     hit
@@ -87,7 +95,7 @@ fn hit() -> impl Strategy<Value = HitBatch> {
     let floats = (number(LIMIT), number(LIMIT), number(LIMIT));
     let ids = (prop_oneof![1..6_u32, Just(u32::MAX)], 0..6_u32);
     let kinds = [PathKind::Camera, PathKind::Reflection, PathKind::Refraction, PathKind::Shadow];
-    let others = (any::<bool>(), prop::sample::select(kinds.to_vec()), [light(), light()]);
+    let others = (any::<bool>(), prop::sample::select(kinds.to_vec()), [light(), light()], 0..3_u32, number(LIMIT));
     (vectors, floats, ids, others).prop_map(|(vectors, floats, ids, others)| HitBatch {
         len: 1,
         position: vec![vectors.0],
@@ -102,8 +110,22 @@ fn hit() -> impl Strategy<Value = HitBatch> {
         path_kind: vec![others.1],
         lights: others.2.to_vec(),
         light_count: 2,
+        attribute_set: vec![others.3],
+        footprint: vec![others.4.abs()],
+        uv_footprint: vec![(others.4 * 0.5).abs()],
+        attributes: Arc::new(attribute_sets()),
         ..HitBatch::default()
     })
+}
+
+/// What objects have for scripts to ask.
+fn attribute_sets() -> Vec<AttributeSet> {
+    let set = |entries: &[(&str, Attribute)]| entries.iter().map(|(name, a)| ((*name).to_owned(), a.clone())).collect();
+    vec![
+        AttributeSet::new(),
+        set(&[("wear", Attribute::Float(0.25)), ("count", Attribute::Int(7)), ("worn", Attribute::Bool(false))]),
+        set(&[("wear", Attribute::Int(-2)), ("tint", Attribute::Vec3(Vec3::new(1.0, 0.0, -3.0)))]),
+    ]
 }
 
 /// All that it takes to run scripts.
@@ -118,8 +140,10 @@ impl Bench {
     fn new() -> Self {
         let pixels = Pixels::Rgba8 { data: vec![[51, 102, 0, 255], [102, 204, 0, 255]], srgb: false };
         let image = Arc::new(Image { width: 2, height: 1, pixels });
-        let texture = Texture { name: "two".into(), image, wrap: [Wrap::Repeat; 2], filter: TextureFilter::Linear };
-        let textures = vec![Arc::new(texture)];
+        let texture = Texture { name: "two".into(), image, wrap: [Wrap::Repeat; 2], filter: TextureFilter::Linear, levels: OnceLock::new() };
+        let wide = Texture { filter: TextureFilter::Mipmap, ..texture.clone() };
+        let textures = vec![Arc::new(texture), Arc::new(wide)];
+        let mip = TextureRef { texture: TextureId::from_index(1), uv_set: 0, transform: Affine2::IDENTITY };
         let map = TextureRef { texture: TextureId::from_index(0), uv_set: 0, transform: Affine2::IDENTITY };
         let values = [
             ("half", Value::Float(0.5)),
@@ -127,6 +151,7 @@ impl Bench {
             ("on", Value::Bool(true)),
             ("none", Value::Unit),
             ("map", Value::Texture(map)),
+            ("mip", Value::Texture(mip)),
         ];
         let values: BTreeMap<String, Value> = values.map(|(name, value)| (name.to_owned(), value)).into();
         let names: BTreeSet<String> = values.keys().cloned().collect();
@@ -137,7 +162,7 @@ impl Bench {
                 .register_fn("native", |x: f32| x * 3.0 - 1.0)
                 .register_fn("native", |hit: Hit| hit.batch.curvature[hit.row]);
         });
-        let mut engine = host.engine(&names);
+        let mut engine = host.engine(&names, &textures);
         engine.set_max_expr_depths(0, 0);
         Self { engine, textures, params, record }
     }
@@ -225,8 +250,10 @@ fn hidden_dependence(
 /// Parses and analyses a script. `None` if the analysis gave up.
 fn claims(bench: &Bench, text: &str) -> Result<Option<(Program, Analysis)>, String> {
     let source = Arc::new(Source { name: "generated.rhai".into(), text: text.into() });
-    let program = Program::parse(&bench.engine, &source).map_err(|faults| format!("{faults}\n{text}"))?;
-    let found = analyse(&program.ast, &bench.params, &bench.textures);
+    let program = Program::parse(&source, &ScriptFiles::default()).map_err(|faults| format!("{faults}\n{text}"))?;
+    let sets = attribute_sets();
+    let attributes: Vec<&AttributeSet> = sets.iter().collect();
+    let found = analyse_program(&program, &bench.params, &bench.textures, &attributes);
     Ok(found.complete.then_some((program, found)))
 }
 
@@ -275,7 +302,7 @@ fn facts_hold_on_generated_scripts() {
 }
 
 /// Scripts in which a dependence is easily missed, each of which some simpler analysis gets wrong.
-const TRICKY: [&str; 17] = [
+const TRICKY: [&str; 24] = [
     // Leaving a loop decides whether a later `return` in it is reached.
     "let i = 0; loop { i += 1; if hit.front_facing { break; } if hit.curvature > 0.0 { return #{ roughness: 0.1 }; }
      if i > 3 { break; } } #{ roughness: 0.2 }",
@@ -302,6 +329,17 @@ const TRICKY: [&str; 17] = [
     // The sign of a zero.
     "let zero = 0.0 * hit.curvature; #{ roughness: 1.0 / zero, metallic: zero }",
     "let zero = min(abs(hit.curvature), 0.0); #{ roughness: 1.0 / zero }",
+    // What a closure captures is shared, in both directions, and by all closures that capture it.
+    "let a = hit.uv.x; let f = |x| x + a; a = hit.time; #{ roughness: f.call(1.0), metallic: a }",
+    "let n = 0.0; let f = |x| { n += x; if x > 1.0 { return 0.0; } n = hit.curvature; 1.0 };
+     if hit.front_facing { f.call(hit.distance); } #{ roughness: n, metallic: f.call(0.0), opacity: n }",
+    "let a = 1.0; let f = || { a = a + hit.time; }; let g = |x| { f.call(); a * x }; a = hit.uv.y; #{ roughness: g.call(2.0), metallic: a }",
+    "let out = #{}; let f = |x| { out.roughness = x; }; if hit.front_facing { f.call(hit.time); } out",
+    "let r = 0.0; for i in 0..hit.object_id % 7 { let k = i * 0.5; let f = |x| { r += x * k; k = r; }; f.call(hit.uv.x); f.call(1.0); }
+     #{ roughness: r }",
+    // A shared array is changed by its own methods.
+    "let a = [hit.time]; if hit.front_facing { let f = || a[0]; f.call(); } a.push(1.0); #{ roughness: a.len(), metallic: a[0] }",
+    "let v = hit.position; let f = |x| { v.x = x; v }; v.y = 2.0; let w = f.call(hit.time); v.x = 0.5; #{ base_color: w, aov_v: v }",
     // A condition with an effect.
     "let r = 0.0; if hit.front_facing && (if hit.time > 0.0 { r = 2.0; true } else { false }) { r += 1.0; }
      #{ roughness: r }",

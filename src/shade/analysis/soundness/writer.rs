@@ -23,6 +23,8 @@ enum Type {
     Vector,
     /// The record that `surface` returns.
     Outputs,
+    /// A closure of a float that gives a float.
+    Closure,
 }
 
 const FLOAT_OUTPUTS: [&str; 5] = ["roughness", "line_width", "metallic", "aov_one", "opacity"];
@@ -108,7 +110,8 @@ impl Writer<'_> {
         if depth == 0 {
             return self.simple_statement();
         }
-        match self.choose(16) {
+        match self.choose(18) {
+            16 | 17 => self.closure(),
             0..=3 => self.simple_statement(),
             4 | 5 => {
                 let of = self.simple_type();
@@ -191,6 +194,21 @@ impl Writer<'_> {
         format!("let {name} = {value};")
     }
 
+    fn closure(&mut self) -> String {
+        let (name, parameter) = (self.name("g"), self.name("x"));
+        let scope = self.variables.len();
+        self.variables.push((parameter.clone(), Type::Float));
+        let outer = (self.returns, self.in_loop.take(), self.this.take());
+        self.returns = Type::Float;
+        let count = self.choose(3);
+        let body = self.statements(count, 1);
+        let end = self.expression(Type::Float, 2);
+        (self.returns, self.in_loop, self.this) = outer;
+        self.variables.truncate(scope);
+        self.variables.push((name.clone(), Type::Closure));
+        format!("let {name} = |{parameter}| {{ {body} {end} }};")
+    }
+
     fn write_output(&mut self) -> String {
         let key = FLOAT_OUTPUTS[usize::from(self.choose(5))];
         format!("out.{key} = {};", self.expression(Type::Float, 2))
@@ -257,7 +275,7 @@ impl Writer<'_> {
             Type::Int => self.int(depth),
             Type::Bool => self.bool(depth),
             Type::Vector => self.vector(depth),
-            Type::Outputs => self.outputs(depth),
+            Type::Outputs | Type::Closure => self.outputs(depth),
         }
     }
 
@@ -287,7 +305,35 @@ impl Writer<'_> {
             };
         }
         let d = depth - 1;
-        match self.choose(27) {
+        match self.choose(36) {
+            33 | 34 => {
+                let (v, x, y) = (self.expression(Type::Vector, d), self.expression(Type::Float, d), self.float(0));
+                match self.choose(12) {
+                    0 => format!("stripes({x}, {y})"),
+                    1 => format!("stripes({x}, {y}, 0.1)"),
+                    2 => format!("checker({v}, {x})"),
+                    3 => format!("dots({v}.xy, {x})"),
+                    4 => format!("dots({v}.xy, {x}, {y})"),
+                    5 => format!("hatch({v}.xy, {x}, {y})"),
+                    6 => format!("cross_hatch({v}.xy, {x}, {y})"),
+                    7 => format!("rotate({v}.xy, {x}).y"),
+                    8 => format!("worley({v}).y"),
+                    9 => format!("fbm({v}, 3, 2.5, 0.4)"),
+                    10 => format!("temperature({x}).y"),
+                    _ => format!("mix_oklab({v}, hsl({x}, saturate({y}), 0.5), {y}).z"),
+                }
+            }
+            28 if self.has_hit => {
+                let default = self.float(0);
+                format!("hit.attribute(\"wear\", to_float({default}))")
+            }
+            29 if self.has_hit => ["hit.attribute(\"missing\", 0.5)", "hit.attribute(\"tint\", vec3(0.5)).y"]
+                [usize::from(self.choose(2))]
+            .into(),
+            30..=32 => match self.variable(Type::Closure) {
+                Some(name) => format!("{name}.call({})", self.expression(Type::Float, d)),
+                None => self.float(0),
+            },
             0 | 1 => self.float(0),
             2..=6 => {
                 let operator = ["+", "-", "*", "/", "%"][usize::from(self.choose(5))];
@@ -325,7 +371,9 @@ impl Writer<'_> {
             19 => format!("({} * {})", self.expression(Type::Int, d), self.float(0)),
             20 if self.has_hit => format!("hit.light({}).visibility", self.choose(2)),
             21 if self.has_hit => {
-                ["native(hit)", "hit.texture(p.map).g", "facing(hit)"][usize::from(self.choose(3))].into()
+                ["native(hit)", "hit.texture(p.map).g", "facing(hit)", "hit.texture(p.mip).r", "hit.footprint"]
+                    [usize::from(self.choose(5))]
+                .into()
             }
             23 => format!("fbm({}, 2)", self.expression(Type::Vector, d)),
             24 => format!(
@@ -343,7 +391,7 @@ impl Writer<'_> {
         if depth == 0 {
             return match self.choose(3) {
                 0 => ["1", "0", "2", "3", "-4", "5"][usize::from(self.choose(6))].into(),
-                1 if self.has_hit => ["hit.object_id", "hit.polygon_id", "p.three"][usize::from(self.choose(3))].into(),
+                1 if self.has_hit => ["hit.object_id", "hit.polygon_id", "p.three", "hit.attribute(\"count\", 1)"][usize::from(self.choose(4))].into(),
                 _ => self.variable(Type::Int).unwrap_or_else(|| self.fallback("hit.polygon_id", "2")),
             };
         }

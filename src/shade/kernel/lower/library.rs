@@ -10,6 +10,7 @@ use super::super::ir::{
 };
 use super::meaning::{Channels, Meaning};
 use super::{Flow, Lowerer};
+use crate::scene::texture::TextureFilter;
 use crate::shade::native::NativeType;
 
 impl Lowerer<'_> {
@@ -38,6 +39,11 @@ impl Lowerer<'_> {
         }
         match (name, arguments) {
             ("light", [Meaning::Hit, Meaning::Int(index)]) => Ok(Some(self.light(*index))),
+            ("texture", [Meaning::Hit, Meaning::Texture(texture)])
+                if self.textures[*texture].texture.filter == TextureFilter::Mipmap =>
+            {
+                self.give_up(position, "a texture with mipmaps")
+            }
             ("texture", [Meaning::Hit, Meaning::Texture(texture)]) => Ok(Some(self.texture_at_hit(*texture))),
             ("texture", [Meaning::Texture(texture), Meaning::Vector(uv)]) if uv.len() == 2 => {
                 Ok(Some(self.texture(*texture, [uv[0], uv[1]])))

@@ -25,17 +25,18 @@ mod statements;
 use std::rc::Rc;
 use std::sync::Arc;
 
-use rhai::{AST, Position};
+use rhai::Position;
 
 use self::meaning::{Channels, Field, Meaning, Record};
 use super::build::Builder;
 use super::ir::{Block, Code, Comparison, Item, Operand, ValueType};
 use crate::scene::texture::{Texture, TextureRef};
-use crate::shade::analysis::{Finding, Functions, ScriptFunction, functions};
+use crate::shade::analysis::Finding;
 use crate::shade::host::{MAX_CALL_DEPTH, MAX_OPERATIONS};
 use crate::shade::names::{AOV_PREFIX, OutputForm, OutputSet};
 use crate::shade::native::NativeFunction;
 use crate::shade::params::{Params, Value};
+use crate::shade::script::{Functions, Program, ScriptFunction};
 
 /// Constructs that are walked before a script counts as too long to be a kernel.
 const MAX_STEPS: u32 = 60_000;
@@ -71,6 +72,8 @@ struct Frame {
     result: usize,
     /// For messages about recursion.
     function: Rc<str>,
+    /// Which of the program's files the code stands in.
+    file: usize,
 }
 
 /// A loop that is being walked; all are exit cells.
@@ -139,11 +142,11 @@ pub(super) enum Target {
 }
 
 /// Lowers the function `surface(hit, p)` of a script for a material with these parameters.
-pub(super) fn lower(ast: &AST, params: &Params, surroundings: Surroundings<'_>) -> Flow<Lowered> {
-    let functions = functions(ast);
+pub(super) fn lower(program: &Program, params: &Params, surroundings: Surroundings<'_>) -> Flow<Lowered> {
+    let functions = &program.functions;
     let mut lowerer = Lowerer {
         builder: Builder::new(),
-        functions: &functions,
+        functions,
         surroundings,
         textures: Vec::new(),
         natives: Vec::new(),
@@ -154,7 +157,8 @@ pub(super) fn lower(ast: &AST, params: &Params, surroundings: Surroundings<'_>) 
         steps: 0,
         next_identity: 0,
     };
-    let Some(function) = functions.get(&("surface".to_owned(), 2)) else {
+    let surface = program.surface_key().and_then(|key| Some((key.0.as_str(), functions.get(key)?)));
+    let Some((name, function)) = surface else {
         return Err(lowerer.blame(Position::NONE, "a script without `surface(hit, p)`"));
     };
     let record = params.0.iter().map(|(name, value)| {
@@ -162,7 +166,7 @@ pub(super) fn lower(ast: &AST, params: &Params, surroundings: Surroundings<'_>) 
     });
     let parameters = Meaning::Parameters(Rc::new(record.collect()));
     let arguments = vec![Meaning::Hit, parameters];
-    let returned = lowerer.call(function, "surface", arguments, None, Position::NONE)?;
+    let returned = lowerer.call(function, name, arguments, None, Position::NONE)?;
     let end = function.body.last().map_or(Position::NONE, rhai::Stmt::position);
     let record = match returned {
         Meaning::Record(record) => record,
@@ -200,6 +204,7 @@ impl Lowerer<'_> {
     /// The reason not to lower a script.
     fn blame(&self, position: Position, what: &str) -> Blame {
         Blame(Finding {
+            file: self.frames.last().map_or(0, |frame| frame.file),
             place: (position.line().unwrap_or(0), position.position().unwrap_or(0)),
             message: format!("{what} cannot be made part of a kernel"),
             hint: None,
@@ -399,7 +404,7 @@ impl Lowerer<'_> {
             return self.give_up(position, "a function for one type of `this`");
         }
         if self.frames.iter().any(|frame| &*frame.function == name) {
-            return self.give_up(position, &format!("`{name}`, which calls itself,"));
+            return self.give_up(position, &format!("`{}`, which calls itself,", function.name));
         }
         // `surface` itself is run, not called.
         if self.frames.len() > MAX_CALL_DEPTH {
@@ -408,7 +413,10 @@ impl Lowerer<'_> {
         let cells = self.cells.len();
         let (returned, result) = (self.new_cell(Meaning::bool(false), true), self.new_cell(Meaning::Undefined, true));
         let entry = self.live;
-        self.frames.push(Frame { names, loops: Vec::new(), returned, result, function: name.into() });
+        // Closures are called within their own file.
+        let outer = self.frames.last().map_or(function.file, |frame| frame.file);
+        let file = if function.is_closure() { outer } else { function.file };
+        self.frames.push(Frame { names, loops: Vec::new(), returned, result, function: name.into(), file });
         let value = self.statements(&function.body)?;
         self.frames.pop();
         let result = self.cells[result].meaning.clone();
