@@ -198,3 +198,18 @@ fn a_reader_that_goes_away_is_no_failure() {
         assert_eq!(run.expect("bash can be run").code(), Some(0), "{command}");
     }
 }
+
+#[test]
+fn the_reference_is_printed_for_terminals_and_as_markdown() {
+    let place = Workplace::new();
+    let markdown = place.run(&["shader", "reference", "--markdown"]).exits(0).stdout();
+    assert_eq!(markdown, tusche::shade::reference::markdown());
+    let text = place.run(&["shader", "reference"]).exits(0).stdout();
+    assert!(!text.contains("|---") && !text.contains("```"));
+    for (name, _) in tusche::shade::InputSet::named() {
+        assert!(text.lines().any(|line| line.split(' ').next() == Some(name)), "{name} is missing");
+    }
+    for function in tusche::shade::library::functions() {
+        assert!(text.contains(function.form), "{} is missing", function.form);
+    }
+}

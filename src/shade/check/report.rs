@@ -3,7 +3,8 @@
 use std::fmt;
 
 use super::TRIAL_HITS;
-use crate::shade::analysis::{Analysis, Finding, OutputFact};
+use crate::diag::Diagnostic;
+use crate::shade::analysis::{Analysis, OutputFact};
 use crate::shade::names::{AOV_PREFIX, InputSet, OutputSet};
 use crate::shade::params::{Params, Value};
 use crate::shade::program::{Mode, Shader};
@@ -14,7 +15,7 @@ pub struct Report {
     /// How it is run.
     pub mode: Mode,
     /// For an interpreted shader: the construct because of which it is, if one is to blame.
-    pub blame: Option<Finding>,
+    pub blame: Option<Diagnostic>,
     /// Of a shader that is not constant: nanoseconds of CPU time for each hit, measured on this machine.
     pub nanoseconds_per_hit: Option<f64>,
     /// Trial hits that the interpreter was run for. Of a kernel: those that it gave up.
@@ -29,7 +30,7 @@ impl Report {
     pub(super) fn new(shader: &Shader, nanoseconds_per_hit: Option<f64>, interpreted_hits: u64) -> Self {
         Self {
             mode: shader.mode(),
-            blame: shader.blame().cloned(),
+            blame: shader.blame_diagnostic(),
             nanoseconds_per_hit,
             interpreted_hits,
             analysis: shader.analysis().clone(),
@@ -70,8 +71,8 @@ impl fmt::Display for Report {
             Mode::Interpreted => writeln!(f, "  mode        interpreted, at every hit")?,
         }
         if let Some(blame) = &self.blame {
-            let (line, column) = blame.place;
-            writeln!(f, "  because     line {line}, column {column}: {}", blame.message)?;
+            let place = blame.span.as_ref().map(|span| format!("{span:?}: ")).unwrap_or_default();
+            writeln!(f, "  because     {place}{}", blame.message)?;
         }
         if let Some(cost) = self.nanoseconds_per_hit {
             writeln!(f, "  cost        {cost:.0} ns a hit, measured here")?;
