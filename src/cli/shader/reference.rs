@@ -19,7 +19,8 @@ fn plain(page: &str) -> String {
             None => {
                 text.push_str(&columns(&std::mem::take(&mut table)));
                 if !line.starts_with("```") {
-                    text.push_str(line.trim_start_matches('#').trim_start_matches(' '));
+                    let heading = ["# ", "## ", "### "].iter().find_map(|mark| line.strip_prefix(mark));
+                    text.push_str(heading.unwrap_or(line));
                     text.push('\n');
                 }
             }
