@@ -18,7 +18,10 @@ fn rendered(objects: &str) -> Picture {
     let mirror = "fn surface(hit, p) { #{ base_color: 1.0, metallic: 1.0, roughness: 0.0, line_width: 0.0 } }";
     let files = FileStore::new()
         .with_file(&path, text)
-        .with_file(root().join("scenes/show.rhai"), "fn surface(hit, p) { #{ color: gray(hit.footprint), line_width: 0 } }")
+        .with_file(
+            root().join("scenes/show.rhai"),
+            "fn surface(hit, p) { #{ color: gray(hit.footprint), line_width: 0 } }",
+        )
         .with_file(root().join("scenes/mirror.rhai"), mirror);
     let loaded = tusche::scene::file::load(&path, &files, &[], &Default::default());
     let (builder, _) = loaded.unwrap_or_else(|faults| panic!("{faults}"));
@@ -41,7 +44,9 @@ const MIDDLE: usize = SIZE / 2;
 
 #[test]
 fn straight_on_it_grows_with_the_distance() {
-    let wall = rendered("[[objects]]\nshape = \"plane\"\nsize = 100\nrotate = [90, 0, 0]\ntranslate = [0, 0, -3]\nmaterial = \"show\"\n");
+    let wall = rendered(
+        "[[objects]]\nshape = \"plane\"\nsize = 100\nrotate = [90, 0, 0]\ntranslate = [0, 0, -3]\nmaterial = \"show\"\n",
+    );
     assert_close(wall.at(0, MIDDLE, MIDDLE), 8.0 * spread(), 1e-2);
 }
 

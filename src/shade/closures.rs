@@ -106,9 +106,13 @@ impl<'f> Group<'f> {
                 true
             });
         }
-        self.others.extend(function.parameters.iter().filter(|_| !function.is_closure()).map(|name| {
-            (name.to_string(), function.body.first().map_or(Position::NONE, Stmt::position))
-        }));
+        self.others.extend(
+            function
+                .parameters
+                .iter()
+                .filter(|_| !function.is_closure())
+                .map(|name| (name.to_string(), function.body.first().map_or(Position::NONE, Stmt::position))),
+        );
         for (name, captured, position) in inner {
             let found = all.iter().find(|((key, _), _)| *key == name).map(|(_, function)| function);
             let Some(function) = found else { continue };
@@ -142,7 +146,9 @@ impl<'f> Group<'f> {
             Expr::DynamicConstant(_, position) if literal(expression).is_some() => {
                 let is_bound = match before {
                     // The function within a closure that captures variables.
-                    [rest @ .., ASTNode::Expr(block), ASTNode::Stmt(_), ASTNode::Expr(_)] if literal(block).is_some() => {
+                    [rest @ .., ASTNode::Expr(block), ASTNode::Stmt(_), ASTNode::Expr(_)]
+                        if literal(block).is_some() =>
+                    {
                         is_initial(rest, block)
                     }
                     _ => is_initial(before, expression),
@@ -177,7 +183,8 @@ impl<'f> Group<'f> {
                     }
                     _ => None,
                 };
-                let is_closure = matches!(target, Some(Expr::Variable(variable, ..)) if self.closures.contains(&*variable.1));
+                let is_closure =
+                    matches!(target, Some(Expr::Variable(variable, ..)) if self.closures.contains(&*variable.1));
                 if !is_closure {
                     let message = "`call` belongs to closures that a variable of this function holds".to_owned();
                     report(message, "write: let f = |x| x * 2.0; f.call(3.0)", *position);

@@ -7,11 +7,11 @@ use std::sync::Arc;
 
 use rhai::{Dynamic, EvalAltResult, LexError, ParseError, ParseErrorType, Position};
 
-use super::host::{MAX_ARRAY, MAX_CALL_DEPTH, MAX_EXPRESSION_DEPTH, MAX_MAP, MAX_OPERATIONS, MAX_TEXT};
 use super::closures;
+use super::host::{MAX_ARRAY, MAX_CALL_DEPTH, MAX_EXPRESSION_DEPTH, MAX_MAP, MAX_OPERATIONS, MAX_TEXT};
 use super::library;
-use super::script::Functions;
 use super::names::{AOV_PREFIX, OutputSet};
+use super::script::Functions;
 use crate::diag::{Diagnostic, Source, Span, nearest};
 
 /// An error raised by a library function; the interpreter adds the place of the call.

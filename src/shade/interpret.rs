@@ -155,6 +155,7 @@ impl<'a> Shading<'a> {
         let constant = shader.mode() == Mode::Constant;
         if shader.mode() == Mode::Kernel
             && self.memories[material.index()].fixed.is_none()
+            && knows_attributes(shader, hits)
             && let Some((kernel, slice)) = self.slice(shader, material, hits.light_count, wanted)
         {
             self.run_kernel(&kernel, &slice, material, hits, wanted, outputs, errors);
@@ -278,4 +279,11 @@ fn repeat(
     for _ in 0..count {
         output::append(row, wanted, outputs);
     }
+}
+
+/// Whether the attributes of a batch are those of the scene, for which its kernels were made.
+fn knows_attributes(shader: &Shader, hits: &HitBatch) -> bool {
+    hits.attribute_set.is_empty()
+        || Arc::ptr_eq(&hits.attributes, &shader.attributes)
+        || hits.attributes == shader.attributes
 }

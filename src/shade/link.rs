@@ -271,9 +271,7 @@ fn join(files: &[File], known: &ScriptFiles, faults: &mut Diagnostics) -> Result
         }
         let engine = host::parser(move |token, position| match (edits.get(&position), &token) {
             (Some(Edit::Word(name)), Token::Identifier(_)) => Token::Identifier(Box::new(name.as_str().into())),
-            (Some(Edit::Text(text)), Token::StringConstant(_)) => {
-                Token::StringConstant(Box::new(text.as_str().into()))
-            }
+            (Some(Edit::Text(text)), Token::StringConstant(_)) => Token::StringConstant(Box::new(text.as_str().into())),
             _ => token,
         });
         let ast = match compile(&engine, &file.source) {
@@ -376,7 +374,9 @@ fn edits(
                 edits.insert(first, Edit::Word(namespace.to_owned()));
                 edits.insert(word, Edit::Word(format!("{}{tail}{target}", call.name)));
             }
-            Err(fault) => faults.push(fault.at(span(&file.source, if call.namespace.path.len() > 1 { first } else { word }))),
+            Err(fault) => {
+                faults.push(fault.at(span(&file.source, if call.namespace.path.len() > 1 { first } else { word })))
+            }
         }
     });
     edits

@@ -15,6 +15,7 @@ use super::params::{self, Params};
 use super::script::Program;
 use crate::diag::{Diagnostic, Diagnostics};
 use crate::scene::Scene;
+use crate::scene::attributes::AttributeSet;
 use crate::scene::ids::MaterialId;
 use crate::scene::texture::Texture;
 
@@ -69,6 +70,7 @@ pub struct Shader {
     light_count: usize,
     textures: Arc<[Arc<Texture>]>,
     natives: Arc<[NativeFunction]>,
+    pub(super) attributes: Arc<Vec<AttributeSet>>,
 }
 
 impl Shader {
@@ -152,6 +154,7 @@ impl Shader {
     fn lower(&self, light_count: usize) -> Result<Arc<Kernel>, Finding> {
         let surroundings = Surroundings {
             textures: &self.textures,
+            attributes: &self.attributes,
             natives: &self.natives,
             material_id: self.material_id,
             light_count: Some(light_count),
@@ -237,6 +240,7 @@ impl Shaders {
                         light_count: scene.lights().len(),
                         textures: Arc::clone(&textures),
                         natives: Arc::clone(&natives),
+                        attributes: Arc::clone(scene.attributes().sets()),
                     };
                     if mode != ShadingMode::Interpreter && !shader.analysis.is_constant() {
                         shader.kernel = Some(shader.lower(shader.light_count));

@@ -87,7 +87,10 @@ impl Program {
         let surface = Self::find(&functions, "surface", 2, "surface(hit, p)", &mut faults);
         if surface.is_none() && !faults.has_errors() {
             let fault = Fault::new("this shader has no function `surface`");
-            let fault = match nearest("surface", functions.values().filter(|f| f.file == 0 && !f.is_closure()).map(|f| f.name.as_str())) {
+            let fault = match nearest(
+                "surface",
+                functions.values().filter(|f| f.file == 0 && !f.is_closure()).map(|f| f.name.as_str()),
+            ) {
                 Some(near) => fault.hint(format!("is `{near}` meant to be it?")),
                 None => fault,
             };
@@ -104,13 +107,7 @@ impl Program {
     }
 
     /// The script's own function of a name, if it has `count` parameters. One of that name with others only is a fault.
-    fn find(
-        functions: &Functions,
-        name: &str,
-        count: usize,
-        form: &str,
-        faults: &mut Diagnostics,
-    ) -> Option<Function> {
+    fn find(functions: &Functions, name: &str, count: usize, form: &str, faults: &mut Diagnostics) -> Option<Function> {
         let found: Vec<_> =
             functions.iter().filter(|(_, function)| function.name == name && function.file == 0).collect();
         if let Some((_, function)) = found.iter().find(|((_, n), _)| *n == count) {

@@ -10,8 +10,8 @@ use crate::math::{Vec2, Vec3, luminance};
 use crate::plan::MaterialPlan;
 use crate::sample::{Node, NodePath};
 use crate::scene::ids::MaterialId;
-use crate::shade::batch::{HitBatch, LightSample, OutputBatch};
 use crate::shade::analysis::inputs::LIMIT;
+use crate::shade::batch::{HitBatch, LightSample, OutputBatch};
 use crate::shade::bsdf::{Bounces, unit};
 use crate::shade::{Bsdf, InputSet, Mode, PathKind};
 
@@ -104,14 +104,7 @@ impl TileTracer<'_> {
     }
 
     /// Adds one hit to a batch: only the columns that are read.
-    pub(super) fn gather(
-        &self,
-        batch: &mut HitBatch,
-        inputs: InputSet,
-        hit: &WaveHit,
-        kind: PathKind,
-        cone: Cone,
-    ) {
+    pub(super) fn gather(&self, batch: &mut HitBatch, inputs: InputSet, hit: &WaveHit, kind: PathKind, cone: Cone) {
         let object = self.world.object(hit.hit.object);
         let surface = &hit.surface;
         batch.len += 1;

@@ -229,6 +229,8 @@ pub fn hits(len: usize, random: &mut Random) -> HitBatch {
         batch.front_facing.push(random.next().is_multiple_of(2));
         batch.pixels_per_unit.push(random.float());
         batch.curvature.push(random.float());
+        batch.footprint.push(random.float());
+        batch.uv_footprint.push(random.float());
         let lights = [random.light(), random.light()];
         batch.lights.extend(lights);
     }

@@ -505,7 +505,7 @@ impl Writer<'_> {
             };
         }
         let d = depth - 1;
-        match self.choose(36) {
+        match self.choose(42) {
             0 | 1 => self.float(0),
             2..=7 => {
                 let operator = self.pick(&["+", "-", "*", "/", "%", "**"]);
@@ -570,6 +570,17 @@ impl Writer<'_> {
                 None => "1.5".into(),
             },
             32 if self.has_hit => format!("p.steps[{}]", self.choose(2)),
+            33 => format!("stripes({}, {}, {})", self.expression(Type::Float, d), self.float(0), self.float(0)),
+            34 => {
+                let name = self.pick(&["dots", "hatch", "cross_hatch"]);
+                format!("{name}({}, {})", self.expression(Type::Vec2, d), self.expression(Type::Number, 0))
+            }
+            35 => format!("checker({}, {})", self.expression(Type::Vec3, d), self.float(0)),
+            36 => format!("fbm({}, 2, 1.5, {})", self.expression(Type::Vec2, d), self.float(0)),
+            37 => format!("worley({}).y", self.expression(Type::Vec3, d)),
+            38 if self.has_hit => {
+                self.pick(&["hit.footprint", "hit.uv_footprint", "hit.attribute(\"wear\", 0.25)"]).into()
+            }
             _ => format!("(-({}))", self.expression(Type::Float, d)),
         }
     }
@@ -644,7 +655,14 @@ impl Writer<'_> {
                 self.expression(Type::Vec2, d)
             ),
             2 => format!("{}.{}", self.expression(Type::Vec3, d), self.pick(&["xy", "zx", "gg"])),
-            3 => format!("{}({})", self.pick(&["floor", "fract", "abs", "normalize"]), self.expression(Type::Vec2, d)),
+            3 => match self.choose(3) {
+                0 => format!("rotate({}, {})", self.expression(Type::Vec2, d), self.float(0)),
+                1 => format!("worley({})", self.expression(Type::Vec2, d)),
+                _ => {
+                    let name = self.pick(&["floor", "fract", "abs", "normalize"]);
+                    format!("{name}({})", self.expression(Type::Vec2, d))
+                }
+            },
             4 => format!("mix({}, {}, {})", self.vec2(0), self.expression(Type::Vec2, d), self.float(0)),
             _ => format!("vec2({})", self.expression(Type::Vec3, d)),
         }
@@ -704,6 +722,14 @@ impl Writer<'_> {
                 let (t, a, b) = (self.expression(Type::Float, d), self.vec3(0), self.vec3(0));
                 format!("ramp({t}, [[{}, {a}], [1.0, {b}]])", self.pick(&["0.0", "0.9", "0.25"]))
             }
+            19 => {
+                const NAMES: [&str; 6] =
+                    ["oklab", "oklab_from_rgb", "oklch", "oklch_from_rgb", "hsl_from_rgb", "srgb_from_rgb"];
+                format!("{}({})", self.pick(&NAMES), self.expression(Type::Vec3, d))
+            }
+            20 => format!("mix_oklab({}, {}, {})", self.expression(Type::Vec3, d), self.vec3(0), self.float(0)),
+            21 => format!("temperature({})", self.expression(Type::Number, d)),
+            22 => format!("hsl({}, {}, {})", self.float(0), self.float(0), self.expression(Type::Float, d)),
             _ => format!("abs({})", self.expression(Type::Vec3, d)),
         }
     }

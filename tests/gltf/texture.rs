@@ -117,8 +117,13 @@ fn crc32(bytes: &[u8]) -> u32 {
 #[test]
 fn the_upper_left_pixel_is_at_zero() {
     let image = decoded(&png(2, 2, &[[255, 0, 0, 255], [0, 255, 0, 255], [0, 0, 255, 255], [0; 4]]), false);
-    let texture =
-        Texture { name: String::new(), image: Arc::new(image), wrap: [Wrap::Clamp; 2], filter: TextureFilter::Nearest, levels: Default::default() };
+    let texture = Texture {
+        name: String::new(),
+        image: Arc::new(image),
+        wrap: [Wrap::Clamp; 2],
+        filter: TextureFilter::Nearest,
+        levels: Default::default(),
+    };
     assert_eq!(texture.sample(Vec2::new(0.1, 0.1)), Vec4::new(1., 0., 0., 1.));
     assert_eq!(texture.sample(Vec2::new(0.9, 0.1)), Vec4::new(0., 1., 0., 1.));
     assert_eq!(texture.sample(Vec2::new(0.1, 0.9)), Vec4::new(0., 0., 1., 1.));
@@ -128,8 +133,13 @@ fn the_upper_left_pixel_is_at_zero() {
 #[test]
 fn lookups_decode_srgb_but_not_alpha() {
     let image = decoded(&png(1, 1, &[[188, 0, 255, 128]]), true);
-    let texture =
-        Texture { name: String::new(), image: Arc::new(image), wrap: [Wrap::Repeat; 2], filter: TextureFilter::Linear, levels: Default::default() };
+    let texture = Texture {
+        name: String::new(),
+        image: Arc::new(image),
+        wrap: [Wrap::Repeat; 2],
+        filter: TextureFilter::Linear,
+        levels: Default::default(),
+    };
     assert_eq!(texture.sample(Vec2::ZERO), Vec4::new(linear_from_srgb(188. / 255.), 0., 1., 128. / 255.));
 }
 
@@ -179,8 +189,13 @@ fn absurd_coordinates_read_as_zero() {
 #[test]
 fn the_range_is_that_of_the_pixels() {
     let image = decoded(&png(2, 1, &[[10, 200, 0, 255], [20, 100, 0, 51]]), true);
-    let texture =
-        Texture { name: String::new(), image: Arc::new(image), wrap: [Wrap::Repeat; 2], filter: TextureFilter::Linear, levels: Default::default() };
+    let texture = Texture {
+        name: String::new(),
+        image: Arc::new(image),
+        wrap: [Wrap::Repeat; 2],
+        filter: TextureFilter::Linear,
+        levels: Default::default(),
+    };
     let linear = |c: f32| linear_from_srgb(c / 255.0);
     assert_eq!(texture.range(), ([linear(10.), linear(100.), 0., 0.2], [linear(20.), linear(200.), 0., 1.]));
     assert_eq!(row(&[-3., 5., 1.], Wrap::Clamp, TextureFilter::Linear).range(), ([-3., 0., 0., 1.], [5., 0., 0., 1.]));

@@ -21,16 +21,24 @@ fn a_closure_is_called_by_its_name() {
 #[test]
 fn captured_variables_are_shared() {
     assert_eq!(shaded("let a = 1.0; let f = |x| x + a; a = 5.0; #{ color: gray(f.call(1)) }"), Vec3::splat(6.0));
-    assert_eq!(shaded("let a = 1.0; let f = || { a += 1.0; }; f.call(); f.call(); #{ color: gray(a) }"), Vec3::splat(3.0));
+    assert_eq!(
+        shaded("let a = 1.0; let f = || { a += 1.0; }; f.call(); f.call(); #{ color: gray(a) }"),
+        Vec3::splat(3.0)
+    );
     assert_eq!(shaded("let a = [1.0]; let f = |x| a.push(x); f.call(2.0); #{ color: gray(a[1]) }"), Vec3::splat(2.0));
-    assert_eq!(shaded("let a = #{ b: 1.0 }; let f = |x| { a.b = x; }; f.call(2.0); #{ color: gray(a.b) }"), Vec3::splat(2.0));
+    assert_eq!(
+        shaded("let a = #{ b: 1.0 }; let f = |x| { a.b = x; }; f.call(2.0); #{ color: gray(a.b) }"),
+        Vec3::splat(2.0)
+    );
     assert_eq!(shaded("let f = || hit.uv.y; #{ color: gray(f.call()) }"), Vec3::splat(0.3));
 }
 
 #[test]
 fn closures_call_closures() {
     assert_eq!(
-        shaded("let a = 1.0; let f = |x| x + a; let g = |x| { a = 10.0; f.call(x) * 2.0 }; #{ color: gray(g.call(1.0)) }"),
+        shaded(
+            "let a = 1.0; let f = |x| x + a; let g = |x| { a = 10.0; f.call(x) * 2.0 }; #{ color: gray(g.call(1.0)) }"
+        ),
         Vec3::splat(22.0)
     );
     assert_eq!(
@@ -83,7 +91,8 @@ fn chains_of_closures_cannot_be_built() {
     assert_refused("let f = |f| f + 1; f.call(1); #{}", "3:13", why);
     assert_refused("let f = 1; let f = |x| x; #{}", "3:9", why);
     // A closure that captures an older one of the same name: as deep as the text, not as the loop.
-    let body = "let f = |x| x; for i in 0..100 { let f = |x| f.call(x) + 1.0; f.call(1.0); } #{ color: gray(f.call(1.0)) }";
+    let body =
+        "let f = |x| x; for i in 0..100 { let f = |x| f.call(x) + 1.0; f.call(1.0); } #{ color: gray(f.call(1.0)) }";
     assert_eq!(shaded(body), Vec3::splat(1.0));
     // A closure cannot see itself.
     assert_refused("let f = |x| f.call(x); #{}", "3:17", "there is no variable `f` here");
@@ -103,9 +112,12 @@ fn arguments_of_closures_are_counted() {
 
 #[test]
 fn errors_in_closures_are_placed() {
-    let said = complaint("fn surface(hit, p) {\n    let f = |x| {\n        x + \"a\".b\n    };\n    #{ line_width: f.call(1) }\n}");
+    let said = complaint(
+        "fn surface(hit, p) {\n    let f = |x| {\n        x + \"a\".b\n    };\n    #{ line_width: f.call(1) }\n}",
+    );
     assert!(said.contains("first.rhai:3:"), "{said}");
-    let said = complaint("fn surface(hit, p) {\n    let f = |x| [x][hit.object_id];\n    #{ line_width: f.call(1) }\n}");
+    let said =
+        complaint("fn surface(hit, p) {\n    let f = |x| [x][hit.object_id];\n    #{ line_width: f.call(1) }\n}");
     assert!(said.contains("first.rhai:2:") && said.contains("the closure was called at line 3, column 22"), "{said}");
 }
 

@@ -74,7 +74,10 @@ fn each_file_has_names_of_its_own() {
 fn own_functions_shadow_the_library_by_their_number_of_parameters() {
     let files = [
         ("main.rhai", "import \"a\" as a;\nfn surface(hit, p) { #{ color: vec3(a::of(3.0), saturate(5.0), 0.0) } }"),
-        ("a.rhai", "fn saturate(x, y) { x + y }\nfn of(x) { saturate(x) + saturate(1.0, 2.0) + [x].len() }\nfn len(a, b) { 7 }"),
+        (
+            "a.rhai",
+            "fn saturate(x, y) { x + y }\nfn of(x) { saturate(x) + saturate(1.0, 2.0) + [x].len() }\nfn len(a, b) { 7 }",
+        ),
     ];
     assert_eq!(try_shade(&files), Ok(Vec3::new(5.0, 1.0, 0.0)));
 }
@@ -100,9 +103,17 @@ fn paths_lead_up_and_built_in_modules_are_found() {
 #[test]
 fn not_found() {
     let main = "import \"lib/hatchin\" as h;\nfn surface(hit, p) { #{} }";
-    assert_said(&[("main.rhai", main)], "main.rhai:1:8", &["cannot read the module", "lib/hatchin.rhai", "no such file"]);
+    assert_said(
+        &[("main.rhai", main)],
+        "main.rhai:1:8",
+        &["cannot read the module", "lib/hatchin.rhai", "no such file"],
+    );
     let main = "import \"builtin:lib/hatchin\" as h;\nfn surface(hit, p) { #{} }";
-    assert_said(&[("main.rhai", main)], "main.rhai:1:8", &["no built-in module `lib/hatchin`", "did you mean `lib/hatching`?"]);
+    assert_said(
+        &[("main.rhai", main)],
+        "main.rhai:1:8",
+        &["no built-in module `lib/hatchin`", "did you mean `lib/hatching`?"],
+    );
     let main = "import \"/lib/a\" as h;\nfn surface(hit, p) { #{} }";
     assert_said(&[("main.rhai", main)], "main.rhai:1:8", &["a script must name files relative to itself"]);
     let main = "import \"lib\\\\a\" as h;\nfn surface(hit, p) { #{} }";
@@ -159,7 +170,8 @@ fn what_is_wrong_in_a_module_is_shown_there() {
 fn calls_that_lead_nowhere() {
     let module = ("a.rhai", "fn stroke(x) { x }\nprivate fn hidden(x) { x }");
     let main = |body: &str| format!("import \"a\" as a;\nfn surface(hit, p) {{\n    #{{ color: {body} }}\n}}");
-    let said = |body: &str, place: &str, words: &[&str]| assert_said(&[("main.rhai", &main(body)), module], place, words);
+    let said =
+        |body: &str, place: &str, words: &[&str]| assert_said(&[("main.rhai", &main(body)), module], place, words);
     said("a::strok(1)", "main.rhai:3:18", &["the module `a` has no function `strok`", "did you mean `stroke`?"]);
     said("a::xyz(1)", "main.rhai:3:18", &["there are: stroke"]);
     said("a::hidden(1)", "main.rhai:3:18", &["`hidden` is private to its module"]);

@@ -17,8 +17,7 @@ fn assert_works(script: &str) {
     let path = root().join("reference-of-a-test/main.rhai");
     let mut png = std::io::Cursor::new(Vec::new());
     image::DynamicImage::new_rgba8(2, 2).write_to(&mut png, image::ImageFormat::Png).expect("it is written");
-    let files =
-        FileStore::new().with_file(&path, script).with_file(path.with_file_name("grain.png"), png.into_inner());
+    let files = FileStore::new().with_file(&path, script).with_file(path.with_file_name("grain.png"), png.into_inner());
     let params = BTreeMap::from([("map".to_owned(), (texture(), None))]);
     let mut builder = scene_with(&[script], params).into_builder();
     builder.scripts[0] = Script { source: files.read_text(&path).expect("it is there"), path: Some(path) };

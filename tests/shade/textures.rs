@@ -48,7 +48,10 @@ fn shaded(color: &str) -> Vec3 {
 #[test]
 fn a_texture_is_looked_up_by_its_path() {
     assert!((shaded("texture(\"grain.png\", vec2(0.75, 0.5)).rgb").x - 0.5).abs() < 0.01);
-    assert_eq!(shaded("texture(\"grain.png\", vec2(0.75, 0.5), \"repeat\", \"linear\").rgb"), Vec3::splat(188.0 / 255.0));
+    assert_eq!(
+        shaded("texture(\"grain.png\", vec2(0.75, 0.5), \"repeat\", \"linear\").rgb"),
+        Vec3::splat(188.0 / 255.0)
+    );
     assert_eq!(shaded("texture(\"grain.png\", vec2(-7.0, 0.5), \"clamp\").rgb"), Vec3::ZERO);
     assert!(shaded("texture(\"./grain.png\", vec2(1.25, 0.5), \"mirror\").rgb").x > 0.4);
     assert_eq!(shaded("texture(\"grain.png\", hit.uv).www * vec3(1, 0, 1)"), Vec3::new(1.0, 0.0, 1.0));
@@ -74,7 +77,11 @@ fn faults_are_told_at_the_path() {
     assert_said("texture(\"gain.png\", hit.uv).rgb", "2:23", &["cannot read the image gain.png: no such file"]);
     assert_said("texture(\"broken.png\", hit.uv).rgb", "2:23", &["broken.png: this is not an image that Tusche reads"]);
     assert_said("texture(\"/grain.png\", hit.uv).rgb", "2:23", &["a script must name files relative to itself"]);
-    assert_said("texture(\"grain.png\", hit.uv, \"clmp\").rgb", "2:44", &["no wrap mode `clmp`", "did you mean `clamp`?"]);
+    assert_said(
+        "texture(\"grain.png\", hit.uv, \"clmp\").rgb",
+        "2:44",
+        &["no wrap mode `clmp`", "did you mean `clamp`?"],
+    );
     assert_said("texture(\"grain.png\", hit.uv, \"clamp\", \"xyz\").rgb", "2:53", &["there are: srgb, linear"]);
     assert_said("texture(\"grain.png\", hit.uv, p).rgb", "2:44", &["wrap mode of a texture must be written out"]);
 }
@@ -82,6 +89,10 @@ fn faults_are_told_at_the_path() {
 #[test]
 fn paths_are_written_out() {
     let words = ["the path of an image must be written out as a text where it is looked up"];
-    assert_said("{ let name = \"grain.png\"; let uv = texture(\"grain.png\", hit.uv); texture(name, hit.uv).rgb }", "2:83", &words);
+    assert_said(
+        "{ let name = \"grain.png\"; let uv = texture(\"grain.png\", hit.uv); texture(name, hit.uv).rgb }",
+        "2:83",
+        &words,
+    );
     assert_said("texture(\"grain\" + \".png\", texture(\"grain.png\", hit.uv).xy).rgb", "2:15", &words);
 }

@@ -19,8 +19,8 @@ use super::{Imported, ModelTime, Placement, animation, camera, instancing, light
 use crate::diag::{Diagnostic, Diagnostics};
 use crate::files::FileStore;
 use crate::math::DAffine3;
-use crate::scene::camera::Camera;
 use crate::scene::attributes::AttributeSet;
+use crate::scene::camera::Camera;
 use crate::scene::ids::{MaterialId, MeshId, TextureId};
 use crate::scene::light::Light;
 use crate::scene::material::{Material, ParamValue};

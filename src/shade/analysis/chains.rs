@@ -7,10 +7,10 @@ use rhai::{ASTFlags, Expr, FnCallExpr, OpAssignment, Position};
 use super::functions;
 use super::inputs;
 use super::interval::Interval;
+use super::nearest_hint;
 use super::operators;
 use super::value::{Abstract, Field, Record, Shape, Vector};
 use super::walk::{Flow, Stop, Walker};
-use super::nearest_hint;
 use crate::shade::names::InputSet;
 
 /// One link of a chain.

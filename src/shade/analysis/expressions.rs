@@ -180,7 +180,8 @@ impl<'a> Walker<'a> {
         if let (Some(variable), Some(first), Some(changed)) = (by_reference, call.args.first(), changed) {
             // Of a variable that a closure shares, the engine passes a copy; whether it is shared may hang on the path.
             if self.find(variable).is_some_and(|variable| variable.cell.is_some()) {
-                return self.give_up(position, &format!("`{name}`, which would change a variable that a closure captures,"));
+                return self
+                    .give_up(position, &format!("`{name}`, which would change a variable that a closure captures,"));
             }
             self.store(first, changed)?;
         }

@@ -304,7 +304,9 @@ fn pattern(name: &str, arguments: &[&Shape]) -> Option<Shape> {
         }
         ("srgb_from_rgb", [_]) => color(Interval::new(0.0, 1.000_001).or_nan(has_nan)),
         ("temperature", [_]) => color(Interval::UNIT.or_nan(has_nan)),
-        ("hsl_from_rgb" | "oklab" | "oklab_from_rgb" | "oklch" | "oklch_from_rgb" | "mix_oklab", _) => color(Interval::ANY),
+        ("hsl_from_rgb" | "oklab" | "oklab_from_rgb" | "oklch" | "oklch_from_rgb" | "mix_oklab", _) => {
+            color(Interval::ANY)
+        }
         ("fbm", [point, _, _, _]) => {
             let nan = point.range().is_none_or(|range| range.nan || range.size() > 1e30);
             Some(Shape::Float(Interval::within(1.0).or_nan(nan)))

@@ -37,8 +37,8 @@ use std::sync::Arc;
 
 use self::value::{Abstract, Field, NOWHERE, Place, Record, Shape};
 use self::walk::{Flow, Walker};
-use super::names::{AOV_PREFIX, InputSet, OutputSet};
 use super::link;
+use super::names::{AOV_PREFIX, InputSet, OutputSet};
 use super::params::{Params, Value};
 use super::script::{Functions, Program};
 use crate::diag;
@@ -156,11 +156,7 @@ pub fn unknown() -> Analysis {
 }
 
 /// The record that `surface` returns; `None` if it never returns.
-fn walk_surface(
-    walker: &mut Walker,
-    surface: Option<&(String, usize)>,
-    params: &Params,
-) -> Flow<Option<Rc<Record>>> {
+fn walk_surface(walker: &mut Walker, surface: Option<&(String, usize)>, params: &Params) -> Flow<Option<Rc<Record>>> {
     let start = rhai::Position::NONE;
     let Some(function) = surface.and_then(|(name, count)| walker.script_function(name, *count)) else {
         return walker.give_up(start, "a script without `surface(hit, p)`");

@@ -14,8 +14,8 @@ use std::fmt;
 
 use smallvec::SmallVec;
 
-use crate::math::portable;
-use crate::shade::library::math;
+use crate::math::{Vec2, Vec3, portable};
+use crate::shade::library::{color, fractal, math, pattern};
 
 /// A column that one instruction sets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -137,6 +137,7 @@ operations! {
         Cosh = portable::cosh(x),
         Tanh = portable::tanh(x),
         LinearFromSrgb = crate::math::linear_from_srgb(x),
+        SrgbFromLinear = crate::math::srgb_from_linear(x),
     }
 }
 
@@ -299,13 +300,17 @@ pub(in crate::shade) enum Column {
     Time,
     PixelsPerUnit,
     Curvature,
+    Footprint,
+    UvFootprint,
+    /// An int: which set of attributes the hit has; −1 where the batch has none.
+    AttributeSet,
     LightCount,
 }
 
 impl Column {
     pub fn kind(self) -> Kind {
         match self {
-            Self::ObjectId | Self::PolygonId | Self::PathKind | Self::LightCount => Kind::Int,
+            Self::ObjectId | Self::PolygonId | Self::PathKind | Self::AttributeSet | Self::LightCount => Kind::Int,
             Self::FrontFacing => Kind::Bool,
             _ => Kind::Float,
         }
@@ -334,6 +339,82 @@ pub(in crate::shade) enum Noise {
     CellId,
     /// So many layers of gradient noise.
     Fbm(u8),
+}
+
+/// Defines functions of several floats: the number of results, and what they are.
+macro_rules! library_functions {
+    ($($(#[$doc:meta])* $variant:ident $(($field:ident: $type:ty))? => $count:literal, $formula:expr;)*) => {
+        /// A function of the library that is worked out a hit at a time.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+        pub(in crate::shade) enum LibraryFunction { $($(#[$doc])* $variant $(($type))?,)* }
+
+        /// Something that runs one function over many rows.
+        pub(in crate::shade) trait LibraryLoop {
+            fn run(self, formula: impl Fn([f32; MOST_ARGUMENTS]) -> [f32; 4]);
+        }
+
+        impl LibraryFunction {
+            /// Number of results.
+            pub fn results(self) -> usize {
+                match self { $(Self::$variant { .. } => $count,)* }
+            }
+
+            /// Hands the function to `loops`. Arguments that it does not have are 0.
+            #[inline(always)]
+            pub fn in_loop(self, loops: impl LibraryLoop) {
+                match self { $(Self::$variant $(($field))? => loops.run($formula),)* }
+            }
+        }
+    };
+}
+
+/// The most arguments of a [`LibraryFunction`].
+pub(in crate::shade) const MOST_ARGUMENTS: usize = 8;
+
+fn three(v: Vec3) -> [f32; 4] {
+    [v.x, v.y, v.z, 0.0]
+}
+
+fn two(v: Vec2) -> [f32; 4] {
+    [v.x, v.y, 0.0, 0.0]
+}
+
+fn one(x: f32) -> [f32; 4] {
+    [x, 0.0, 0.0, 0.0]
+}
+
+library_functions! {
+    RgbFromHsv => 3, |a| three(color::rgb_from_hsv(a[0], a[1], a[2]));
+    HsvFromRgb => 3, |a| three(color::hsv_from_rgb(Vec3::new(a[0], a[1], a[2])));
+    RgbFromHsl => 3, |a| three(color::rgb_from_hsl(a[0], a[1], a[2]));
+    HslFromRgb => 3, |a| three(color::hsl_from_rgb(Vec3::new(a[0], a[1], a[2])));
+    RgbFromOklab => 3, |a| three(color::rgb_from_oklab(Vec3::new(a[0], a[1], a[2])));
+    OklabFromRgb => 3, |a| three(color::oklab_from_rgb(Vec3::new(a[0], a[1], a[2])));
+    RgbFromOklch => 3, |a| three(color::rgb_from_oklch(Vec3::new(a[0], a[1], a[2])));
+    OklchFromRgb => 3, |a| three(color::oklch_from_rgb(Vec3::new(a[0], a[1], a[2])));
+    /// Two colours and the share of the second.
+    MixOklab => 3, |a| three(color::mix_oklab(Vec3::new(a[0], a[1], a[2]), Vec3::new(a[3], a[4], a[5]), a[6]));
+    Temperature => 3, |a| three(color::temperature(a[0]));
+    /// x, width, filter.
+    Stripes => 1, |a| one(pattern::stripes(a[0], a[1], a[2]));
+    /// Two coordinates, filter.
+    Checker2 => 1, |a| one(pattern::checker(&a[..2], a[2]));
+    /// Three coordinates, filter.
+    Checker3 => 1, |a| one(pattern::checker(&a[..3], a[3]));
+    /// u, v, radius, filter.
+    Dots => 1, |a| one(pattern::dots(Vec2::new(a[0], a[1]), a[2], a[3]));
+    /// u, v, darkness, filter.
+    Hatch => 1, |a| one(pattern::hatch(Vec2::new(a[0], a[1]), a[2], a[3]));
+    /// u, v, darkness, filter.
+    CrossHatch => 1, |a| one(pattern::cross_hatch(Vec2::new(a[0], a[1]), a[2], a[3]));
+    /// A vector and an angle.
+    Rotate => 2, |a| two(pattern::rotate(Vec2::new(a[0], a[1]), a[2]));
+    Worley2 => 2, |a| two(fractal::worley([a[0], a[1]], None));
+    Worley3 => 2, |a| two(fractal::worley([a[0], a[1]], Some(a[2])));
+    /// Two coordinates, lacunarity, gain.
+    Layered2(octaves: u8) => 1, |a| one(fractal::layered([a[0], a[1]], None, octaves.into(), a[2], a[3]));
+    /// Three coordinates, lacunarity, gain.
+    Layered3(octaves: u8) => 1, |a| one(fractal::layered([a[0], a[1]], Some(a[2]), octaves.into(), a[3], a[4]));
 }
 
 /// What an instruction does. Masks come last.
@@ -367,11 +448,9 @@ pub(in crate::shade) enum Code {
     HashInt(u32),
     /// Of two or three coordinates.
     Noise(Noise),
-    /// hue, saturation, value → red, green, blue.
-    RgbFromHsv,
-    /// red, green, blue → hue, saturation, value.
-    HsvFromRgb,
-    /// u, v → red, green, blue, alpha, by number in the kernel's table.
+    /// Floats → floats.
+    Library(LibraryFunction),
+    /// u, v → red, green, blue, alpha, by number in the kernel's table; with a third operand, the width of the lookup.
     Texture(u16),
     /// A plug-in's function, by number in the kernel's table: its arguments' components, mask. It is called at hits in
     /// the mask only.

@@ -11,14 +11,14 @@ use smallvec::SmallVec;
 
 use super::ir::{
     BoolBinary, Code, Column, FloatBinaryLoop, FloatTernaryLoop, FloatUnaryLoop, IntBinaryLoop, IntCheckedLoop, Kind,
-    LightPart, Noise,
+    LibraryLoop, LightPart, MOST_ARGUMENTS, Noise,
 };
 use super::lower::TextureUse;
 use super::slice::{CarriedRegisters, LoopSteps, Register, Runnable, Step};
 use crate::math::{Vec2, Vec3, Vec4};
 use crate::shade::batch::HitBatch;
 use crate::shade::library::batch::noise as batch;
-use crate::shade::library::{color, hash, hit, math};
+use crate::shade::library::{hash, hit, math};
 use crate::shade::names::PathKind;
 use crate::shade::native::{NativeFunction, NativeType, NativeValue};
 
@@ -432,8 +432,16 @@ impl Registers {
                 self.noise(noise, operands, &mut out[..blocks]);
                 self.floats.put(results[0], out);
             }
-            Code::RgbFromHsv => self.colors(operands, results, blocks, |c| color::rgb_from_hsv(c.x, c.y, c.z)),
-            Code::HsvFromRgb => self.colors(operands, results, blocks, color::hsv_from_rgb),
+            Code::Library(function) => {
+                let mut outs: [Vec<Block<f32>>; 4] = Default::default();
+                for (out, result) in outs.iter_mut().zip(results) {
+                    *out = self.floats.take(*result);
+                }
+                function.in_loop(Rows { outs: &mut outs[..results.len()], operands, floats: &self.floats, blocks });
+                for (out, result) in outs.into_iter().zip(results) {
+                    self.floats.put(*result, out);
+                }
+            }
             Code::Texture(texture) => self.texture(&chunk.textures[usize::from(texture)], operands, results, blocks),
             Code::Input(column, lane) => self.input(column, usize::from(lane), results[0], chunk),
             Code::Light(part) => self.light(part, operands[0], results[0], chunk),
@@ -473,28 +481,17 @@ impl Registers {
         }
     }
 
-    /// A function from one colour to another.
-    #[inline(always)]
-    fn colors(&mut self, operands: &[Register], results: &[Register], blocks: usize, f: impl Fn(Vec3) -> Vec3) {
-        let mut outs = [0, 1, 2].map(|i| self.floats.take(results[i]));
-        let views = [0, 1, 2].map(|i| self.floats.view(operands[i]));
-        for row in 0..blocks * LANES {
-            let color = f(Vec3::from_array(views.map(|view| view.row(row))));
-            for (out, x) in outs.iter_mut().zip(color.to_array()) {
-                out[row / LANES].0[row % LANES] = x;
-            }
-        }
-        for (register, out) in results.iter().zip(outs) {
-            self.floats.put(*register, out);
-        }
-    }
-
     #[inline(always)]
     fn texture(&mut self, texture: &TextureUse, operands: &[Register], results: &[Register], blocks: usize) {
         let mut outs = [0, 1, 2, 3].map(|i| self.floats.take(results[i]));
         let (u, v) = (self.floats.view(operands[0]), self.floats.view(operands[1]));
+        let width = operands.get(2).map(|width| self.floats.view(*width));
         for row in 0..blocks * LANES {
-            let color: Vec4 = texture.texture.sample(Vec2::new(u.row(row), v.row(row)));
+            let place = Vec2::new(u.row(row), v.row(row));
+            let color: Vec4 = match width {
+                Some(width) => texture.texture.sample_wide(place, width.row(row)),
+                None => texture.texture.sample(place),
+            };
             for (out, x) in outs.iter_mut().zip(color.to_array()) {
                 out[row / LANES].0[row % LANES] = x;
             }
@@ -614,6 +611,8 @@ impl Registers {
                     Column::Depth => load(&mut out, &hits.depth, chunk, |x| x),
                     Column::PixelsPerUnit => load(&mut out, &hits.pixels_per_unit, chunk, |x| x),
                     Column::Curvature => load(&mut out, &hits.curvature, chunk, |x| x),
+                    Column::Footprint => load(&mut out, &hits.footprint, chunk, |x| x),
+                    Column::UvFootprint => load(&mut out, &hits.uv_footprint, chunk, |x| x),
                     _ => out[0] = Block([hits.time; LANES]),
                 }
                 self.floats.put(result, out);
@@ -624,6 +623,10 @@ impl Registers {
                     Column::ObjectId => load(&mut out, &hits.object_id, chunk, i64::from),
                     Column::PolygonId => load(&mut out, &hits.polygon_id, chunk, i64::from),
                     Column::PathKind => load(&mut out, &hits.path_kind, chunk, PathKind::place),
+                    Column::AttributeSet if hits.attribute_set.is_empty() => {
+                        out[..chunk.blocks()].fill(Block([-1; LANES]));
+                    }
+                    Column::AttributeSet => load(&mut out, &hits.attribute_set, chunk, i64::from),
                     _ => out[0] = Block([hits.light_count as i64; LANES]),
                 }
                 self.ints.put(result, out);
@@ -814,6 +817,33 @@ impl FloatTernaryLoop for Ternary<'_> {
             let (a, b, c) = (self.a.block(index), self.b.block(index), self.c.block(index));
             for lane in 0..LANES {
                 out.0[lane] = formula(a[lane], b[lane], c[lane]);
+            }
+        }
+    }
+}
+
+struct Rows<'a> {
+    outs: &'a mut [Vec<Block<f32>>],
+    operands: &'a [Register],
+    floats: &'a Bank<f32>,
+    blocks: usize,
+}
+
+impl LibraryLoop for Rows<'_> {
+    #[inline(always)]
+    fn run(self, formula: impl Fn([f32; MOST_ARGUMENTS]) -> [f32; 4]) {
+        for index in 0..self.blocks {
+            // Transposed for one row after the other.
+            let mut rows = [[0.0; MOST_ARGUMENTS]; LANES];
+            for (argument, operand) in self.operands.iter().enumerate() {
+                let block = self.floats.view(*operand).block(index);
+                for (row, x) in rows.iter_mut().zip(block) {
+                    row[argument] = *x;
+                }
+            }
+            let results = rows.map(&formula);
+            for (channel, out) in self.outs.iter_mut().enumerate() {
+                out[index].0 = std::array::from_fn(|lane| results[lane][channel]);
             }
         }
     }

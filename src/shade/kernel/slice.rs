@@ -210,8 +210,13 @@ fn short_cost(item: &Item) -> Option<u32> {
         ) => 1,
         Code::Float1(_) => 30,
         Code::Noise(Noise::Fbm(octaves)) => 60 * u32::from(octaves),
-        Code::Noise(_) | Code::Texture(_) | Code::Native { .. } | Code::Light(_) | Code::Irradiance => 60,
-        Code::HashFloats(_) | Code::HashInt(_) | Code::RgbFromHsv | Code::HsvFromRgb => 15,
+        Code::Noise(_)
+        | Code::Library(_)
+        | Code::Texture(_)
+        | Code::Native { .. }
+        | Code::Light(_)
+        | Code::Irradiance => 60,
+        Code::HashFloats(_) | Code::HashInt(_) => 15,
         _ => 1,
     })
 }
@@ -552,6 +557,9 @@ fn input(code: Code) -> InputSet {
             Column::Time => InputSet::TIME,
             Column::PixelsPerUnit => InputSet::PIXELS_PER_UNIT,
             Column::Curvature => InputSet::CURVATURE,
+            Column::Footprint => InputSet::FOOTPRINT,
+            Column::UvFootprint => InputSet::UV_FOOTPRINT,
+            Column::AttributeSet => InputSet::ATTRIBUTE,
             Column::LightCount => InputSet::LIGHT_COUNT,
         },
         _ => InputSet::empty(),

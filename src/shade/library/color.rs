@@ -18,13 +18,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         types: "numbers → colour",
         example: "rgb(0.9, 0.5, 0.2)",
     },
-    Function {
-        name: "gray",
-        form: "gray(x)",
-        about: "rgb(x, x, x)",
-        types: "number → colour",
-        example: "gray(0.5)",
-    },
+    Function { name: "gray", form: "gray(x)", about: "rgb(x, x, x)", types: "number → colour", example: "gray(0.5)" },
     Function {
         name: "srgb",
         form: "srgb(r, g, b)",

@@ -16,19 +16,22 @@ use crate::shade::fault::Fault;
 use crate::shade::names::InputSet;
 use crate::shade::params::Value;
 
-pub(super) const FUNCTIONS: &[Function] = &[Function {
+pub(super) const FUNCTIONS: &[Function] = &[
+    Function {
         name: "light",
         form: "hit.light(i)",
         about: "light number 0 … hit.light_count − 1, with its direction, radiance and visibility",
         types: "int → light: `direction` (unit vector towards it), `radiance` (colour), `visibility` (0 … 1)",
         example: "if hit.light_count > 0 { hit.light(0).visibility } else { 0.0 }",
-    }, Function {
+    },
+    Function {
         name: "attribute",
         form: "hit.attribute(\"name\", default)",
         about: "a value of the object's or material's attributes, of the default's type; the default where there is none",
         types: "text, any of number, vector, text, true or false → the default's type",
         example: "hit.attribute(\"wear\", 0.0)",
-    }];
+    },
+];
 
 /// A row of a batch: the batch is shared, so that a hit costs one small allocation whatever it reads.
 #[derive(Clone, Debug)]

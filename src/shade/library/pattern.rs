@@ -215,7 +215,8 @@ mod tests {
     fn mean(f: impl Fn(f32, f32) -> f32, width: f32) -> f32 {
         let steps = 400;
         let at = |i: i32| ((i as f32 + 0.5) / steps as f32 - 0.5) * width;
-        let sum: f64 = (0..steps).flat_map(|i| (0..steps).map(move |j| (i, j))).map(|(i, j)| f64::from(f(at(i), at(j)))).sum();
+        let sum: f64 =
+            (0..steps).flat_map(|i| (0..steps).map(move |j| (i, j))).map(|(i, j)| f64::from(f(at(i), at(j)))).sum();
         (sum / f64::from(steps * steps)) as f32
     }
 

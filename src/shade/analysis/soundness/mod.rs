@@ -140,7 +140,13 @@ impl Bench {
     fn new() -> Self {
         let pixels = Pixels::Rgba8 { data: vec![[51, 102, 0, 255], [102, 204, 0, 255]], srgb: false };
         let image = Arc::new(Image { width: 2, height: 1, pixels });
-        let texture = Texture { name: "two".into(), image, wrap: [Wrap::Repeat; 2], filter: TextureFilter::Linear, levels: OnceLock::new() };
+        let texture = Texture {
+            name: "two".into(),
+            image,
+            wrap: [Wrap::Repeat; 2],
+            filter: TextureFilter::Linear,
+            levels: OnceLock::new(),
+        };
         let wide = Texture { filter: TextureFilter::Mipmap, ..texture.clone() };
         let textures = vec![Arc::new(texture), Arc::new(wide)];
         let mip = TextureRef { texture: TextureId::from_index(1), uv_set: 0, transform: Affine2::IDENTITY };

@@ -391,7 +391,9 @@ impl Writer<'_> {
         if depth == 0 {
             return match self.choose(3) {
                 0 => ["1", "0", "2", "3", "-4", "5"][usize::from(self.choose(6))].into(),
-                1 if self.has_hit => ["hit.object_id", "hit.polygon_id", "p.three", "hit.attribute(\"count\", 1)"][usize::from(self.choose(4))].into(),
+                1 if self.has_hit => ["hit.object_id", "hit.polygon_id", "p.three", "hit.attribute(\"count\", 1)"]
+                    [usize::from(self.choose(4))]
+                .into(),
                 _ => self.variable(Type::Int).unwrap_or_else(|| self.fallback("hit.polygon_id", "2")),
             };
         }

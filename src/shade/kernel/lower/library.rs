@@ -1,17 +1,21 @@
 //! The library's functions and the inputs, as instructions that do the same steps in the same order.
 
 use std::rc::Rc;
+use std::sync::Arc;
 
 use rhai::Position;
 
 use super::super::ir::{
-    Code, Column, Comparison, FloatBinary, FloatTernary, FloatUnary, IntBinary, IntChecked, Kind, LightPart, Noise,
-    Operand,
+    Code, Column, Comparison, FloatBinary, FloatTernary, FloatUnary, IntBinary, IntChecked, Kind, LibraryFunction,
+    LightPart, Noise, Operand,
 };
 use super::meaning::{Channels, Meaning};
 use super::{Flow, Lowerer};
-use crate::scene::texture::TextureFilter;
+use crate::math::{Affine2, Vec2, Vec3, Vec4};
+use crate::scene::texture::{TextureFilter, TextureRef};
+use crate::shade::library::texture_of;
 use crate::shade::native::NativeType;
+use crate::shade::params::Value;
 
 impl Lowerer<'_> {
     /// A call of a function that the script does not define, or an operator.
@@ -39,14 +43,26 @@ impl Lowerer<'_> {
         }
         match (name, arguments) {
             ("light", [Meaning::Hit, Meaning::Int(index)]) => Ok(Some(self.light(*index))),
-            ("texture", [Meaning::Hit, Meaning::Texture(texture)])
-                if self.textures[*texture].texture.filter == TextureFilter::Mipmap =>
-            {
-                self.give_up(position, "a texture with mipmaps")
-            }
             ("texture", [Meaning::Hit, Meaning::Texture(texture)]) => Ok(Some(self.texture_at_hit(*texture))),
             ("texture", [Meaning::Texture(texture), Meaning::Vector(uv)]) if uv.len() == 2 => {
-                Ok(Some(self.texture(*texture, [uv[0], uv[1]])))
+                Ok(Some(self.texture(*texture, &[uv[0], uv[1]])))
+            }
+            ("texture", [Meaning::Texture(texture), Meaning::Vector(uv), width]) if uv.len() == 2 => {
+                Ok(self.number(width).map(|width| self.texture(*texture, &[uv[0], uv[1], width])))
+            }
+            ("texture", [Meaning::Text(name), Meaning::Vector(uv), options @ ..])
+                if uv.len() == 2 && options.len() <= 2 && options.iter().all(|o| matches!(o, Meaning::Text(_))) =>
+            {
+                Ok(self.named_texture(name, [uv[0], uv[1]]))
+            }
+            ("attribute", [Meaning::Hit, Meaning::Text(name), default]) => {
+                self.attribute(name, default, position).map(Some)
+            }
+            ("fbm", [Meaning::Vector(point), Meaning::Int(octaves), lacunarity, gain]) => {
+                let Some(octaves @ 1..=10) = octaves.as_int() else {
+                    return self.give_up(position, "`fbm` with a number of octaves that varies or is out of range");
+                };
+                Ok(self.layered(point, octaves as u8, lacunarity, gain))
             }
             ("ramp", [t, Meaning::Array(stops)]) => {
                 let stops = Rc::clone(stops);
@@ -70,6 +86,7 @@ impl Lowerer<'_> {
                 .or_else(|| self.of_ints(name, arguments))
                 .or_else(|| self.channelwise(name, arguments))
                 .or_else(|| self.geometry(name, arguments))
+                .or_else(|| self.of_library(name, arguments))
                 .or_else(|| self.other(name, arguments))
                 .or_else(|| self.plug_in(name, arguments))),
         }
@@ -144,6 +161,8 @@ impl Lowerer<'_> {
             "time" => (Column::Time, 1),
             "pixels_per_unit" => (Column::PixelsPerUnit, 1),
             "curvature" => (Column::Curvature, 1),
+            "footprint" => (Column::Footprint, 1),
+            "uv_footprint" => (Column::UvFootprint, 1),
             "object_id" => return Ok(Meaning::Int(self.builder.emit(Code::Input(Column::ObjectId, 0), &[]))),
             "polygon_id" => return Ok(Meaning::Int(self.builder.emit(Code::Input(Column::PolygonId, 0), &[]))),
             "path_kind" => return Ok(Meaning::PathKind(self.builder.emit(Code::Input(Column::PathKind, 0), &[]))),
@@ -164,11 +183,14 @@ impl Lowerer<'_> {
         }
     }
 
-    /// An instruction that gives the channels of a vector.
+    /// An instruction that gives a float, or the channels of a vector.
     fn many(&mut self, code: Code, operands: &[Operand], count: usize) -> Meaning {
         let first = self.builder.emit_many(code, operands, &vec![Kind::Float; count]);
-        let channels = (0..count as u32).map(|i| Operand::Value(super::super::ir::Value(first.0 + i)));
-        Meaning::Vector(channels.collect())
+        let mut channels = (0..count as u32).map(|i| Operand::Value(super::super::ir::Value(first.0 + i)));
+        match count {
+            1 => Meaning::Float(Operand::Value(first)),
+            _ => Meaning::Vector(channels.by_ref().collect()),
+        }
     }
 
     /// `hit.light(index)`. Hits where there is none of that index fail.
@@ -211,11 +233,126 @@ impl Lowerer<'_> {
             let sum = self.float2(FloatBinary::Add, along, across);
             self.float2(FloatBinary::Add, sum, Operand::float(t))
         });
-        self.texture(texture, uv)
+        if self.textures[texture].texture.filter != TextureFilter::Mipmap {
+            return self.texture(texture, &uv);
+        }
+        let scale = Operand::float(m.determinant().abs().sqrt());
+        let footprint = self.builder.emit(Code::Input(Column::UvFootprint, 0), &[]);
+        let width = self.float2(FloatBinary::Multiply, footprint, scale);
+        self.texture(texture, &[uv[0], uv[1], width])
     }
 
-    fn texture(&mut self, texture: usize, uv: [Operand; 2]) -> Meaning {
-        self.many(Code::Texture(texture as u16), &uv, 4)
+    /// At u and v, and perhaps over a width.
+    fn texture(&mut self, texture: usize, operands: &[Operand]) -> Meaning {
+        self.many(Code::Texture(texture as u16), operands, 4)
+    }
+
+    /// An image that the script names; linking has put its number in place of its path.
+    fn named_texture(&mut self, name: &str, uv: [Operand; 2]) -> Option<Meaning> {
+        let id = texture_of(name)?;
+        let texture = Arc::clone(self.surroundings.textures.get(id.index())?);
+        let place = TextureRef { texture: id, uv_set: 0, transform: Affine2::IDENTITY };
+        match self.texture_use(texture, place) {
+            Meaning::Texture(index) => Some(self.texture(index, &uv)),
+            _ => None,
+        }
+    }
+
+    /// `hit.attribute(name, default)`: one select for each set of attributes that has it. Where it is of another type
+    /// than the default, hits fail.
+    fn attribute(&mut self, name: &str, default: &Meaning, position: Position) -> Flow<Meaning> {
+        let form = match default {
+            Meaning::Bool(_) => Value::Bool(false),
+            Meaning::Int(_) => Value::Int(0),
+            Meaning::Float(_) => Value::Float(0.0),
+            Meaning::Vector(channels) if channels.len() == 2 => Value::Vec2(Vec2::ZERO),
+            Meaning::Vector(channels) if channels.len() == 3 => Value::Vec3(Vec3::ZERO),
+            Meaning::Vector(_) => Value::Vec4(Vec4::ZERO),
+            Meaning::Text(_) => Value::Text(String::new()),
+            other => return self.give_up(position, &format!("an attribute that is {}", other.name())),
+        };
+        let sets = Arc::clone(self.surroundings.attributes);
+        let mut value = default.clone();
+        for (number, set) in sets.iter().enumerate() {
+            let Some(given) = set.get(name) else { continue };
+            let own = self.builder.emit(Code::Input(Column::AttributeSet, 0), &[]);
+            let here = self.builder.emit(Code::CompareInts(Comparison::Equal), &[own, Operand::Int(number as i64)]);
+            match given.for_default(&form) {
+                Some(given) => {
+                    let given = self.parameter(&given);
+                    value = self.builder.join(here, &given, &value);
+                }
+                None => self.fail_where(here),
+            }
+        }
+        Ok(value)
+    }
+
+    /// Functions that are worked out a hit at a time.
+    fn of_library(&mut self, name: &str, arguments: &[Meaning]) -> Option<Meaning> {
+        use LibraryFunction as F;
+        let mut operands = Channels::new();
+        let mut forms: Vec<usize> = Vec::new();
+        for argument in arguments {
+            match argument {
+                Meaning::Vector(channels) => {
+                    forms.push(channels.len());
+                    operands.extend_from_slice(channels);
+                }
+                number => {
+                    forms.push(1);
+                    operands.push(self.number(number)?);
+                }
+            }
+        }
+        let function = match (name, forms.as_slice()) {
+            ("hsv", [1, 1, 1]) => F::RgbFromHsv,
+            ("hsv_from_rgb", [3]) => F::HsvFromRgb,
+            ("hsl", [1, 1, 1]) => F::RgbFromHsl,
+            ("hsl_from_rgb", [3]) => F::HslFromRgb,
+            ("oklab", [1, 1, 1] | [3]) => F::RgbFromOklab,
+            ("oklab_from_rgb", [3]) => F::OklabFromRgb,
+            ("oklch", [1, 1, 1] | [3]) => F::RgbFromOklch,
+            ("oklch_from_rgb", [3]) => F::OklchFromRgb,
+            ("mix_oklab", [3, 3, 1]) => F::MixOklab,
+            ("temperature", [1]) => F::Temperature,
+            ("stripes", [1, 1] | [1, 1, 1]) => F::Stripes,
+            ("checker", [2] | [2, 1]) => F::Checker2,
+            ("checker", [3] | [3, 1]) => F::Checker3,
+            ("dots", [2, 1] | [2, 1, 1]) => F::Dots,
+            ("hatch", [2, 1] | [2, 1, 1]) => F::Hatch,
+            ("cross_hatch", [2, 1] | [2, 1, 1]) => F::CrossHatch,
+            ("rotate", [2, 1]) => F::Rotate,
+            ("worley", [2]) => F::Worley2,
+            ("worley", [3]) => F::Worley3,
+            ("srgb_from_rgb", [3]) => {
+                let channels = operands.iter().map(|x| self.float1(FloatUnary::SrgbFromLinear, *x));
+                return Some(Meaning::Vector(channels.collect()));
+            }
+            _ => return None,
+        };
+        // A filter that is left out is 0, as missing arguments are.
+        Some(self.many(Code::Library(function), &operands, function.results()))
+    }
+
+    /// `fbm` with a lacunarity of 1 to 4 and a gain of 0 to 1; hits fail where they are out of these ranges.
+    fn layered(&mut self, point: &Channels, octaves: u8, lacunarity: &Meaning, gain: &Meaning) -> Option<Meaning> {
+        let function = match point.len() {
+            2 => LibraryFunction::Layered2(octaves),
+            3 => LibraryFunction::Layered3(octaves),
+            _ => return None,
+        };
+        let (lacunarity, gain) = (self.number(lacunarity)?, self.number(gain)?);
+        for (x, low, high) in [(lacunarity, 1.0, 4.0), (gain, 0.0, 1.0)] {
+            let above = self.builder.emit(Code::CompareFloats(Comparison::GreaterEqual), &[x, Operand::float(low)]);
+            let below = self.builder.emit(Code::CompareFloats(Comparison::LessEqual), &[x, Operand::float(high)]);
+            let inside = self.builder.and(above, below);
+            let outside = self.builder.not(inside);
+            self.fail_where(outside);
+        }
+        let mut operands = point.clone();
+        operands.extend([lacunarity, gain]);
+        Some(self.many(Code::Library(function), &operands, 1))
     }
 
     // Functions of numbers and vectors.
@@ -454,11 +591,6 @@ impl Lowerer<'_> {
             ("gradient_noise", [Meaning::Vector(point)]) => self.noise(Noise::Gradient, point),
             ("cellular_noise", [Meaning::Vector(point)]) => self.noise(Noise::Cellular, point),
             ("cell_id", [Meaning::Vector(point)]) => self.noise(Noise::CellId, point),
-            ("hsv", [h, s, v]) => {
-                let operands = [self.number(h)?, self.number(s)?, self.number(v)?];
-                Some(self.many(Code::RgbFromHsv, &operands, 3))
-            }
-            ("hsv_from_rgb", [Meaning::Vector(c)]) if c.len() == 3 => Some(self.many(Code::HsvFromRgb, c, 3)),
             ("is_nan", [Meaning::Float(x)]) => Some(Meaning::Bool(self.builder.emit(Code::IsNan, &[*x]))),
             ("to_float", [x]) => Some(Meaning::Float(self.number(x)?)),
             ("to_int", [Meaning::Int(x)]) => Some(Meaning::Int(*x)),

@@ -30,6 +30,7 @@ use rhai::Position;
 use self::meaning::{Channels, Field, Meaning, Record};
 use super::build::Builder;
 use super::ir::{Block, Code, Comparison, Item, Operand, ValueType};
+use crate::scene::attributes::AttributeSet;
 use crate::scene::texture::{Texture, TextureRef};
 use crate::shade::analysis::Finding;
 use crate::shade::host::{MAX_CALL_DEPTH, MAX_OPERATIONS};
@@ -96,6 +97,8 @@ pub(in crate::shade) struct Surroundings<'a> {
     pub textures: &'a [Arc<Texture>],
     /// Material number, from 1, as `hit.material_id`.
     pub material_id: u32,
+    /// The scene's sets of attributes.
+    pub attributes: &'a Arc<Vec<AttributeSet>>,
     /// Functions that plug-ins have added.
     pub natives: &'a [NativeFunction],
     /// Lights in the scene; `None` if the same kernel must serve any number.
