@@ -6,6 +6,7 @@ mod check;
 mod json;
 mod new;
 mod preview;
+mod reference;
 
 use std::path::Path;
 
@@ -23,7 +24,7 @@ pub(super) fn run(command: &ShaderCommand) -> Result<(), Failure> {
         ShaderCommand::Bench(arguments) => bench::run(arguments),
         ShaderCommand::New(arguments) => new::run(arguments),
         ShaderCommand::Preview(arguments) => preview::run(arguments),
-        ShaderCommand::Reference => print(&reference::markdown()),
+        ShaderCommand::Reference(arguments) => reference::run(arguments),
     }
 }
 
