@@ -10,12 +10,11 @@ mod reference;
 
 use std::path::Path;
 
-use super::{Failure, print};
+use super::Failure;
 use crate::diag::Diagnostics;
 use crate::files::FileStore;
 use crate::scene::ids::MaterialId;
 use crate::scene::{Scene, SceneBuilder, file};
-use crate::shade::reference;
 pub(super) use args::ShaderCommand;
 
 pub(super) fn run(command: &ShaderCommand) -> Result<(), Failure> {
