@@ -36,13 +36,6 @@ fn the_document_for_editors_is_as_recorded() {
 }
 
 #[test]
-fn the_reference_is_printed() {
-    let place = Workplace::new();
-    let run = place.run(&["shader", "reference"]).exits(0);
-    assert_eq!(run.stdout(), fs::read_to_string(root().join("shaders/README.md")).expect("it is shipped"));
-}
-
-#[test]
 fn modules_are_checked_with_the_script_that_imports_them() {
     let place = Workplace::new();
     place.file("look.rhai", "import \"lib/ink\" as ink;\nfn surface(hit, p) { #{ line_width: ink::width(hit) } }\n");

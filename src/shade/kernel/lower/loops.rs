@@ -69,7 +69,7 @@ impl<'a> Lowerer<'a> {
         }
         loop {
             match self.dynamic(None, &mut round, position)? {
-                None => return Ok(self.leave_loop_behind()),
+                None => return Ok(self.leave_dynamic_behind()),
                 Some(Obstacle::Form(what)) if peeled == MAX_PEELED => return self.give_up(position, &what),
                 Some(Obstacle::Form(_)) => {
                     peeled += 1;
@@ -179,7 +179,7 @@ impl<'a> Lowerer<'a> {
                     round(lowerer, Meaning::Int(number), Meaning::Int(index))
                 };
                 match self.dynamic(Some(Counter { range }), &mut numbered, position)? {
-                    None => Ok(self.leave_loop_behind()),
+                    None => Ok(self.leave_dynamic_behind()),
                     // A first round cannot be peeled off where nobody knows whether there is one.
                     Some(Obstacle::Form(what)) => self.give_up(position, &what),
                 }
@@ -280,6 +280,13 @@ impl<'a> Lowerer<'a> {
         }
         self.cells.truncate(outside);
         value
+    }
+
+    /// The same behind a loop of the program: hits have left it in no other way than with a value, be it `()`.
+    fn leave_dynamic_behind(&mut self) -> Meaning {
+        let value = self.innermost().map(|(_, _, value, ..)| self.cells[value].meaning.clone());
+        self.leave_loop_behind();
+        value.filter(|value| *value != Meaning::Undefined).unwrap_or(Meaning::Unit)
     }
 
     /// Makes the innermost loop a loop of the program. Its body is walked again and again, until it is known which
