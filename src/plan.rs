@@ -85,7 +85,7 @@ impl Plan {
     #[must_use]
     pub fn new(scene: &Scene, shaders: &Shaders, layers: &[Layer]) -> Self {
         let settings = scene.render();
-        let color = layers.iter().any(|layer| matches!(layer, Layer::Rgba | Layer::Color));
+        let color = layers.iter().any(|layer| matches!(layer, Layer::Rgba | Layer::Color | Layer::Below));
         let used = used_materials(scene);
         let tests = scene.lines();
         let wants_feature = tests.feature.is_some() || layers.contains(&Layer::Feature);
@@ -103,7 +103,8 @@ impl Plan {
         for (material, shader) in materials.iter_mut().zip(shaders.iter()) {
             let may = shader.analysis().writable();
             if lines.is_some() {
-                material.wanted |= may & (OutputSet::LINE_COLOR | OutputSet::LINE_WIDTH | OutputSet::PRIORITY);
+                material.wanted |= may
+                    & (OutputSet::LINE_COLOR | OutputSet::LINE_WIDTH | OutputSet::LINE_OPACITY | OutputSet::PRIORITY);
             }
             if wants_feature && (lines.is_some() || layers.contains(&Layer::Feature)) {
                 material.wanted |= may & OutputSet::FEATURE;
@@ -228,7 +229,9 @@ fn plan_material(shader: &Shader, lights: bool, color: bool, used: bool) -> Mate
 
 fn plan_lines(scene: &Scene, shaders: &Shaders, layers: &[Layer], used: &[bool]) -> Option<LinePlan> {
     let settings = scene.lines();
-    let shown = layers.iter().any(|l| matches!(l, Layer::Rgba | Layer::Line | Layer::LineType(_)));
+    let shown = layers
+        .iter()
+        .any(|l| matches!(l, Layer::Rgba | Layer::Below | Layer::Line | Layer::LineType(_) | Layer::LinePath(_)));
     let tested = settings.object
         || settings.shader
         || settings.uv.is_some()
@@ -257,6 +260,9 @@ fn plan_lines(scene: &Scene, shaders: &Shaders, layers: &[Layer], used: &[bool])
         return None;
     }
     let rules = Rules::new(settings, scene.render().samples).with_widest(widest);
+    // Only layers by type tell why a line is there.
+    let by_type = layers.iter().any(|layer| matches!(layer, Layer::LineType(_)));
+    let rules = if by_type { rules } else { rules.with_any_pair() };
     let reach = rules.reach();
     Some(LinePlan { rules, widest, reach })
 }

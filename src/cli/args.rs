@@ -116,11 +116,12 @@ pub struct SceneArguments {
     /// Changes a value of the scene file, for example lines.width=3; may be given more than once.
     #[arg(long, value_name = "PATH=VALUE")]
     pub set: Vec<String>,
-    /// Writes this layer: rgba, color, line, line.TYPE, Z, N, P, uv, object, feature, aov_NAME. A .png shows the first;
-    /// an .exr holds exactly these [default: rgba; all but line.TYPE].
+    /// Writes this layer: rgba, color, line, line.TYPE, line.PATH, below, Z, N, P, uv, object, feature, aov_NAME. A .png
+    /// shows the first; an .exr holds exactly these [default: rgba; all but line.TYPE, line.PATH and below].
     #[arg(long, value_name = "NAME")]
     pub layer: Vec<String>,
-    /// How lines are found: `exact` is fast, `brute` tries every pair and gives the same picture.
+    /// How lines are found: `exact` is fast, `brute` tries every pair and gives the same picture; `choudhury` (2009) and
+    /// `bauer` (2017) are older methods, to compare with.
     #[arg(long, value_name = "HOW", default_value = "exact")]
     pub lines: LineMode,
     /// How shaders are run: `kernel` refuses scripts that cannot be compiled, `interpreter` gives the same picture slowly.
@@ -159,11 +160,18 @@ pub enum LineMode {
     Off,
     Exact,
     Brute,
+    Choudhury,
+    Bauer,
 }
 
 impl LineMode {
     pub fn method(self) -> Method {
-        if self == Self::Brute { Method::Brute } else { Method::Exact }
+        match self {
+            Self::Off | Self::Exact => Method::Exact,
+            Self::Brute => Method::Brute,
+            Self::Choudhury => Method::Choudhury,
+            Self::Bauer => Method::Bauer,
+        }
     }
 }
 

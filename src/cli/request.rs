@@ -98,7 +98,7 @@ fn load(
     Ok((builder, warnings))
 }
 
-/// The layers of an output: those asked for, or a PNG's `rgba` and everything but `line.TYPE` for an EXR.
+/// The layers of an output: those asked for, or a PNG's `rgba` and everything but parts of others (`line.TYPE`, `line.PATH`, `below`) for an EXR.
 fn layers_for(path: &Path, asked: &[String], shaders: &Shaders) -> Result<Vec<Layer>, Diagnostic> {
     let is_exr = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("exr"));
     let aovs = shaders.aovs();

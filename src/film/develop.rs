@@ -11,11 +11,11 @@
 //! plain one wherever a pixel has no line, which is nearly everywhere.
 
 use super::filter::Filter;
-use super::layer::{FilmTile, Layer};
+use super::layer::{FilmTile, Layer, LinePath};
 use super::spread::{Spread, Sums};
 use crate::line::{LineBuffer, LineType, SeenLine};
 use crate::math::{Vec3, Vec4};
-use crate::sample::{PixelRect, SampleBuffer, SampleColor};
+use crate::sample::{PixelRect, SampleBuffer};
 
 /// Tiles of samples with their lines, in a grid as in [`crate::line::Window`].
 #[derive(Clone, Debug)]
@@ -53,7 +53,17 @@ pub fn develop(window: &FilmWindow<'_>, rect: PixelRect, filter: &Filter, layers
             }))
         })
         .collect();
-    let filtered = filter_fields(window, rect, filter, &fields);
+    let covered = (has_lines && layers.contains(&Layer::Below)).then(|| {
+        let lines = Field::Lines(Shown::All);
+        fields.iter().position(|field| *field == lines).unwrap_or_else(|| {
+            fields.push(lines);
+            fields.len() - 1
+        })
+    });
+    let mut filtered = filter_fields(window, rect, filter, &fields);
+    if let Some(covered) = covered {
+        uncover(&fields, &mut filtered, covered);
+    }
 
     let mut channels = Vec::new();
     for (layer, field) in layers.iter().zip(shown) {
@@ -77,6 +87,17 @@ pub fn develop(window: &FilmWindow<'_>, rect: PixelRect, filter: &Filter, layers
         }
     }
     FilmTile { rect, channels }
+}
+
+/// Brings the colours below the lines from the share of the pixel that they fill to the whole pixel.
+fn uncover(fields: &[Field], filtered: &mut [Vec<Vec4>], covered: usize) {
+    // Below this, nothing of the quotient is seen under the line.
+    const LEAST: f32 = 1e-4;
+    let Some(below) = fields.iter().position(|field| *field == Field::Below) else { return };
+    for pixel in 0..filtered[below].len() {
+        let share = 1.0 - filtered[covered][pixel].w;
+        filtered[below][pixel] = if share > LEAST { filtered[below][pixel] / share } else { Vec4::ZERO };
+    }
 }
 
 /// Filters each field into the pixels of `rect`, row by row.
@@ -204,10 +225,30 @@ enum Field {
     Lined,
     /// Colours without.
     Plain,
-    /// Premultiplied lines, all or of one type.
-    Lines(Option<LineType>),
+    /// Premultiplied lines.
+    Lines(Shown),
+    /// What lines leave of the colours.
+    Below,
     /// An extra output.
     Aov(usize),
+}
+
+/// Which lines.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Shown {
+    All,
+    OfType(LineType),
+    AtPath(LinePath),
+}
+
+impl Shown {
+    fn contains(self, line: &SeenLine) -> bool {
+        match self {
+            Self::All => true,
+            Self::OfType(kind) => LineType::of(line.fired) == Some(kind),
+            Self::AtPath(path) => LinePath::of(line.path) == path,
+        }
+    }
 }
 
 /// What a pixel's samples hold of a field.
@@ -226,8 +267,11 @@ impl Field {
         match layer {
             Layer::Rgba if has_lines => Some(Self::Lined),
             Layer::Rgba | Layer::Color => Some(Self::Plain),
-            Layer::Line => has_lines.then_some(Self::Lines(None)),
-            Layer::LineType(kind) => has_lines.then_some(Self::Lines(Some(*kind))),
+            Layer::Below if has_lines => Some(Self::Below),
+            Layer::Below => Some(Self::Plain),
+            Layer::Line => has_lines.then_some(Self::Lines(Shown::All)),
+            Layer::LineType(kind) => has_lines.then_some(Self::Lines(Shown::OfType(*kind))),
+            Layer::LinePath(path) => has_lines.then_some(Self::Lines(Shown::AtPath(*path))),
             Layer::Aov(index, _) => Some(Self::Aov(*index)),
             Layer::Depth | Layer::Normal | Layer::Position | Layer::Uv | Layer::Object | Layer::Feature => None,
         }
@@ -236,23 +280,30 @@ impl Field {
     /// Puts the values of a pixel's samples into `values`, unless they are zero.
     fn gather(self, pixel: &SourcePixel<'_>, values: &mut Vec<Vec4>) -> Gathered {
         let samples = pixel.first..pixel.end;
-        let plain = |color: &SampleColor| Vec3::from(color.color).extend(color.alpha);
+        let buffer = pixel.buffer;
+        let plain = |sample: usize| Vec3::from(buffer.color[sample]).extend(buffer.alpha.get(sample));
         let lined = || pixel.lined.iter().map(|&sample| sample as usize - pixel.first).zip(pixel.lines);
         match self {
-            Self::Plain | Self::Lined => {
+            Self::Plain | Self::Lined | Self::Below => {
                 values.clear();
-                values.extend(pixel.buffer.color[samples].iter().map(plain));
+                values.extend(samples.map(plain));
                 if self == Self::Plain || pixel.lines.is_empty() {
                     return Gathered::Plain;
                 }
                 for (sample, line) in lined() {
                     let alpha = values[sample].w;
-                    values[sample] = Vec3::from(line.lined).extend(alpha + (1.0 - alpha) * line.alpha);
+                    values[sample] = match self {
+                        Self::Below => {
+                            let left = Vec3::from(line.lined) - Vec3::from(line.color) * line.alpha;
+                            left.extend(alpha * (1.0 - line.alpha))
+                        }
+                        _ => Vec3::from(line.lined).extend(alpha + (1.0 - alpha) * line.alpha),
+                    };
                 }
                 Gathered::Own
             }
-            Self::Lines(kind) => {
-                let shown = |line: &SeenLine| kind.is_none() || kind == LineType::of(line.fired);
+            Self::Lines(lines) => {
+                let shown = |line: &SeenLine| lines.contains(line);
                 if !pixel.lines.iter().any(shown) {
                     return Gathered::Zero;
                 }
@@ -289,6 +340,12 @@ fn nearest_value(layer: &Layer) -> Option<fn(&SampleBuffer, usize) -> [f32; 3]> 
         }),
         Layer::Object => Some(|buffer, sample| [f32::from_bits(buffer.paths[0].object.get(sample)), 0.0, 0.0]),
         Layer::Feature => Some(|buffer, sample| at_hit(buffer, sample, buffer.paths[0].feature.get(sample))),
-        Layer::Rgba | Layer::Color | Layer::Line | Layer::LineType(_) | Layer::Aov(..) => None,
+        Layer::Rgba
+        | Layer::Color
+        | Layer::Line
+        | Layer::LineType(_)
+        | Layer::LinePath(_)
+        | Layer::Below
+        | Layer::Aov(..) => None,
     }
 }

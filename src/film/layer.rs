@@ -5,7 +5,7 @@ use std::str::FromStr;
 
 use crate::diag::{self, Diagnostic};
 use crate::line::LineType;
-use crate::sample::PixelRect;
+use crate::sample::{NodePath, PixelRect};
 
 /// A layer. Its `Display` is its name in files and for `--layer`.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -18,6 +18,13 @@ pub enum Layer {
     Line,
     /// The lines of one type alone, premultiplied: `line.TYPE.R G B A`.
     LineType(LineType),
+    /// The lines at the ends of one kind of path alone, premultiplied: `line.camera.R G B A`, `line.reflection.R G B A`,
+    /// `line.refraction.R G B A`.
+    LinePath(LinePath),
+    /// What lies below the lines, premultiplied: `below.R G B A`. The layer `line` *over* this one is `rgba`, also in pixels
+    /// that a line only partly covers, where `color` would be wrong: it holds the colours under the line, too. (With
+    /// `compose = "throughput"`, only where no reflected or refracted line is.)
+    Below,
     /// Distance from the camera along the ray, nearest sample; ∞ at a miss: `Z`.
     Depth,
     /// Shading normal in world space, nearest sample; 0 at a miss: `N.X Y Z`.
@@ -33,6 +40,29 @@ pub enum Layer {
     /// A script's extra output, filtered: `aov_NAME.R G B`. The number is its place in
     /// [`SampleBuffer::aovs`](crate::sample::SampleBuffer::aovs), the text is NAME.
     Aov(usize, String),
+}
+
+/// How a sample's line was seen: by the last event of its path.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum LinePath {
+    /// Directly.
+    Camera,
+    /// In a mirror reflection.
+    Reflection,
+    /// Through a refraction, or straight through a see-through surface.
+    Refraction,
+}
+
+impl LinePath {
+    /// Of a node's path.
+    #[must_use]
+    pub fn of(path: NodePath) -> Self {
+        match path.ends_reflected() {
+            None => Self::Camera,
+            Some(true) => Self::Reflection,
+            Some(false) => Self::Refraction,
+        }
+    }
 }
 
 /// How a channel's values are stored in EXR.
@@ -62,7 +92,7 @@ const AOV_PREFIX: &str = "aov_";
 
 impl Layer {
     /// All layers but the scripts' own, in the order of the documentation.
-    pub const FIXED: [Self; 15] = [
+    pub const FIXED: [Self; 19] = [
         Self::Rgba,
         Self::Color,
         Self::Line,
@@ -72,6 +102,10 @@ impl Layer {
         Self::LineType(LineType::Crease),
         Self::LineType(LineType::Uv),
         Self::LineType(LineType::Feature),
+        Self::LinePath(LinePath::Camera),
+        Self::LinePath(LinePath::Reflection),
+        Self::LinePath(LinePath::Refraction),
+        Self::Below,
         Self::Depth,
         Self::Normal,
         Self::Position,
@@ -110,7 +144,9 @@ impl Layer {
     #[must_use]
     pub fn channels(&self) -> Vec<Channel> {
         let (components, format): (&[&str], _) = match self {
-            Self::Rgba | Self::Color | Self::Line | Self::LineType(_) => (RGBA, ChannelFormat::Half),
+            Self::Rgba | Self::Color | Self::Line | Self::LineType(_) | Self::LinePath(_) | Self::Below => {
+                (RGBA, ChannelFormat::Half)
+            }
             Self::Depth => (&["Z"], ChannelFormat::Float),
             Self::Normal | Self::Position => (XYZ, ChannelFormat::Float),
             Self::Uv => (&["U", "V"], ChannelFormat::Float),
@@ -142,6 +178,10 @@ impl fmt::Display for Layer {
             Self::LineType(LineType::Crease) => "line.crease",
             Self::LineType(LineType::Uv) => "line.uv",
             Self::LineType(LineType::Feature) => "line.feature",
+            Self::LinePath(LinePath::Camera) => "line.camera",
+            Self::LinePath(LinePath::Reflection) => "line.reflection",
+            Self::LinePath(LinePath::Refraction) => "line.refraction",
+            Self::Below => "below",
             Self::Depth => "Z",
             Self::Normal => "N",
             Self::Position => "P",

@@ -20,6 +20,6 @@ pub use atomic::{check_writable, write_atomically};
 pub use compare::{Comparison, compare, write_difference};
 pub use develop::{FilmWindow, develop};
 pub use filter::Filter;
-pub use layer::{Channel, ChannelFormat, FilmTile, Layer};
+pub use layer::{Channel, ChannelFormat, FilmTile, Layer, LinePath};
 pub use output::{Output, OutputSettings};
 pub use picture::Picture;

@@ -2,15 +2,15 @@
 //!
 //! | layer | shown as |
 //! |---|---|
-//! | `rgba`, `color`, `feature`, `aov_NAME` | sRGB |
-//! | `line`, `line.TYPE` | sRGB with alpha |
+//! | `rgba`, `color`, `below`, `feature`, `aov_NAME` | sRGB |
+//! | `line`, `line.TYPE`, `line.PATH` | sRGB with alpha |
 //! | `N` | n / 2 + 1/2, black at a miss |
 //! | `P` | the fractional part of each coordinate |
 //! | `Z` | 1 / (1 + z): white at the camera, black at infinity |
 //! | `uv` | red and green are the fractional parts of u and v |
 //! | `object` | one colour per id, black at a miss |
 //!
-//! `rgba` and `color` have an alpha channel if the settings say so. Colours are stored premultiplied on the film and
+//! `rgba`, `color` and `below` have an alpha channel if the settings say so. Colours are stored premultiplied on the film and
 //! divided by alpha for PNG, as its standard asks.
 
 use std::io::{self, ErrorKind, Write};
@@ -54,8 +54,8 @@ impl PngFormat {
         }
         let start = settings.layers[..place].iter().map(|layer| layer.channels().len()).sum();
         let alpha = match layer {
-            Layer::Rgba | Layer::Color => settings.transparent,
-            Layer::Line | Layer::LineType(_) => true,
+            Layer::Rgba | Layer::Color | Layer::Below => settings.transparent,
+            Layer::Line | Layer::LineType(_) | Layer::LinePath(_) => true,
             _ => false,
         };
         Ok(Self {

@@ -1,17 +1,21 @@
-//! What is known of a pixel's, a block's and a tile's nodes without looking at them: the search rejects with it.
+//! What is known of a pixel's, a block's and a tile's nodes without looking at them: the search decides most with it.
 //!
 //! All bounds are exact in the sense that matters: floating-point subtraction, multiplication and addition of
 //! non-negative numbers are monotone, so a test that does not exceed its threshold for the corners of two boxes does not
-//! exceed it for any two points in them either, roundings included. No epsilon is needed anywhere.
+//! exceed it for any two points in them either, and one that exceeds it for their nearest points exceeds it for all,
+//! roundings included. No epsilon is needed anywhere.
+//!
+//! Bounds of uv, normals and feature colours ([`Shape`]) lie apart from the others ([`Bounds`]) and exist only where a
+//! test reads them: what is scanned most stays small.
 
-use super::differ::{Features, Tests};
+use super::differ::Tests;
 use super::pair::Rank;
 use super::rules::Rules;
-use super::window::features;
+use super::window::style;
 use crate::sample::{Column, NodeColumns, NodePath, PixelRect, SampleBuffer};
 
 /// Side of a block in pixels.
-const BLOCK: usize = 8;
+const BLOCK: i32 = 8;
 
 /// What the line pass knows of a tile of samples before it starts. Made once per tile, when it has been traced.
 #[derive(Clone, Debug)]
@@ -36,7 +40,11 @@ impl TileBounds {
     #[must_use]
     pub fn bytes(&self) -> usize {
         let of_path = |path: &PathBounds| {
-            path.radius_squared.bytes() + size_of_val(&path.pixels[..]) + size_of_val(&path.blocks[..])
+            path.radius_squared.bytes()
+                + size_of_val(&path.pixels[..])
+                + size_of_val(&path.shapes[..])
+                + size_of_val(&path.by_rank[..])
+                + size_of_val(&path.blocks[..])
         };
         self.paths.iter().map(|path| size_of::<PathBounds>() + of_path(path)).sum()
     }
@@ -52,10 +60,12 @@ struct Extent<const N: usize> {
 impl<const N: usize> Extent<N> {
     const EMPTY: Self = Self { low: [f32::INFINITY; N], high: [f32::NEG_INFINITY; N] };
 
+    #[inline]
     fn point(value: [f32; N]) -> Self {
         Self { low: value, high: value }
     }
 
+    #[inline]
     fn union(&self, other: &Self) -> Self {
         let mut union = *self;
         for i in 0..N {
@@ -71,6 +81,12 @@ impl<const N: usize> Extent<N> {
         (self.high[i] - other.low[i]).max(other.high[i] - self.low[i]).max(0.0)
     }
 
+    /// The smallest one. Both must hold a point.
+    #[inline]
+    fn smallest_difference(&self, other: &Self, i: usize) -> f32 {
+        (self.low[i] - other.high[i]).max(other.low[i] - self.high[i]).max(0.0)
+    }
+
     /// The largest squared distance between a point here and one there; 0 if either is empty.
     #[inline]
     fn largest_distance_squared(&self, other: &Self) -> f32 {
@@ -81,84 +97,151 @@ impl<const N: usize> Extent<N> {
         }
         sum
     }
+
+    /// The smallest one. Both must hold a point.
+    #[inline]
+    fn smallest_distance_squared(&self, other: &Self) -> f32 {
+        let mut sum = 0.0;
+        for i in 0..N {
+            let difference = self.smallest_difference(other, i);
+            sum += difference * difference;
+        }
+        sum
+    }
 }
 
-/// Bounds of a set of nodes.
+/// Bounds of the feature attributes of the hits in a set of nodes.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Shape {
+    uv: Extent<2>,
+    normal: Extent<3>,
+    feature: Extent<3>,
+}
+
+impl Shape {
+    pub(super) const EMPTY: Self = Self { uv: Extent::EMPTY, normal: Extent::EMPTY, feature: Extent::EMPTY };
+
+    #[inline]
+    fn union(&self, other: &Self) -> Self {
+        Self {
+            uv: self.uv.union(&other.uv),
+            normal: self.normal.union(&other.normal),
+            feature: self.feature.union(&other.feature),
+        }
+    }
+
+    /// Whether hits here and there may differ.
+    #[inline]
+    fn may_differ(&self, other: &Self, tests: &Tests) -> bool {
+        (tests.uv_squared < f32::INFINITY && self.uv.largest_distance_squared(&other.uv) > tests.uv_squared)
+            || (tests.chord_squared < f32::INFINITY
+                && self.normal.largest_distance_squared(&other.normal) > tests.chord_squared)
+            || (tests.feature < f32::INFINITY
+                && (0..3).any(|i| self.feature.largest_difference(&other.feature, i) > tests.feature))
+    }
+
+    /// Whether all hits here differ from all there. Both must hold a hit.
+    #[inline]
+    fn must_differ(&self, other: &Self, tests: &Tests) -> bool {
+        (tests.uv_squared < f32::INFINITY && self.uv.smallest_distance_squared(&other.uv) > tests.uv_squared)
+            || (tests.chord_squared < f32::INFINITY
+                && self.normal.smallest_distance_squared(&other.normal) > tests.chord_squared)
+            || (tests.feature < f32::INFINITY
+                && (0..3).any(|i| self.feature.smallest_difference(&other.feature, i) > tests.feature))
+    }
+}
+
+/// Bounds of a set of nodes, but for their [`Shape`].
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Bounds {
     /// Smallest and largest.
     object: [u32; 2],
     /// Smallest and largest.
     shader: [u32; 2],
-    /// Of hits, as the next two.
-    uv: Extent<2>,
-    normal: Extent<3>,
-    feature: Extent<3>,
     /// The highest rank of a node that draws a line, or [`Rank::LAST`].
     pub best: Rank,
+    /// The highest rank of any node.
+    pub highest: Rank,
     /// The lowest rank of any node.
-    pub worst: Rank,
+    pub lowest: Rank,
     /// The widest line's.
     pub radius_squared: f32,
+    /// The thinnest line's; ∞ if there is no line.
+    pub thinnest_squared: f32,
+    /// Whose style the lines have.
+    pub stylist: Stylist,
+}
+
+/// The style of the lines of a set of nodes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Stylist {
+    /// There are no lines.
+    None,
+    /// All have that of this row and are opaque.
+    Alike(u32),
+    /// They have several.
+    Many,
 }
 
 impl Bounds {
     const EMPTY: Self = Self {
         object: [u32::MAX, 0],
         shader: [u32::MAX, 0],
-        uv: Extent::EMPTY,
-        normal: Extent::EMPTY,
-        feature: Extent::EMPTY,
         best: Rank::LAST,
-        worst: Rank { priority: i32::MAX, depth: f32::NEG_INFINITY },
+        highest: Rank::LAST,
+        lowest: Rank::FIRST,
         radius_squared: 0.0,
+        thinnest_squared: f32::INFINITY,
+        stylist: Stylist::None,
     };
 
-    /// The bounds of one node.
     #[inline]
-    pub(super) fn of_node(features: &Features, rank: Rank, radius_squared: f32) -> Self {
-        let mut bounds = Self {
-            object: [features.object; 2],
-            shader: [features.shader; 2],
-            best: if radius_squared > 0.0 { rank } else { Rank::LAST },
-            worst: rank,
-            radius_squared,
-            ..Self::EMPTY
-        };
-        if !features.is_miss() {
-            bounds.uv = Extent::point(features.uv);
-            bounds.normal = Extent::point(features.normal);
-            bounds.feature = Extent::point(features.feature);
-        }
-        bounds
-    }
-
-    #[inline]
-    fn union(&self, other: &Self) -> Self {
+    fn union(&self, other: &Self, nodes: &NodeColumns) -> Self {
         let range = |a: [u32; 2], b: [u32; 2]| [a[0].min(b[0]), a[1].max(b[1])];
         Self {
             object: range(self.object, other.object),
             shader: range(self.shader, other.shader),
-            uv: self.uv.union(&other.uv),
-            normal: self.normal.union(&other.normal),
-            feature: self.feature.union(&other.feature),
             best: self.best.better(other.best),
-            worst: if self.worst.outranks(other.worst) { other.worst } else { self.worst },
+            highest: self.highest.better(other.highest),
+            lowest: self.lowest.worse(other.lowest),
             radius_squared: self.radius_squared.max(other.radius_squared),
+            thinnest_squared: self.thinnest_squared.min(other.thinnest_squared),
+            stylist: match (self.stylist, other.stylist) {
+                (Stylist::None, one) | (one, Stylist::None) => one,
+                (Stylist::Alike(a), Stylist::Alike(b)) if style(nodes, a as usize) == style(nodes, b as usize) => {
+                    Stylist::Alike(a)
+                }
+                _ => Stylist::Many,
+            },
         }
     }
+}
 
+/// Bounds with a shape, which is empty where no test reads it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Bounded<'a> {
+    pub bounds: &'a Bounds,
+    pub shape: &'a Shape,
+}
+
+impl Bounded<'_> {
     /// Whether a node here and one there may differ.
     #[inline]
-    pub(super) fn may_differ(&self, other: &Self, tests: &Tests) -> bool {
+    pub(super) fn may_differ(&self, other: &Bounded<'_>, tests: &Tests) -> bool {
         let uniform = |a: [u32; 2], b: [u32; 2]| a[0] == a[1] && b == a;
-        (tests.object && !uniform(self.object, other.object))
-            || (tests.shader && !uniform(self.shader, other.shader))
-            || (tests.uv_squared < f32::INFINITY && self.uv.largest_distance_squared(&other.uv) > tests.uv_squared)
-            || (tests.chord_squared < f32::INFINITY
-                && self.normal.largest_distance_squared(&other.normal) > tests.chord_squared)
-            || (tests.feature < f32::INFINITY
-                && (0..3).any(|i| self.feature.largest_difference(&other.feature, i) > tests.feature))
+        (tests.object && !uniform(self.bounds.object, other.bounds.object))
+            || (tests.shader && !uniform(self.bounds.shader, other.bounds.shader))
+            || (tests.reads_shapes && self.shape.may_differ(other.shape, tests))
+    }
+
+    /// Whether all nodes here surely differ from all there.
+    #[inline]
+    pub(super) fn must_differ(&self, other: &Bounded<'_>, tests: &Tests) -> bool {
+        let apart = |a: [u32; 2], b: [u32; 2]| a[1] < b[0] || b[1] < a[0];
+        let all_hits = self.bounds.object[0] > 0 && other.bounds.object[0] > 0;
+        (tests.object && apart(self.bounds.object, other.bounds.object))
+            || (tests.shader && apart(self.bounds.shader, other.bounds.shader))
+            || (tests.reads_shapes && all_hits && self.shape.must_differ(other.shape, tests))
     }
 }
 
@@ -180,10 +263,18 @@ pub(super) struct Block {
     /// The pixels of the picture, whether they have nodes or not.
     pub rect: PixelRect,
     pub bounds: Bounds,
+    shape: Shape,
     /// Its first pixel in [`PathBounds::pixels`].
-    first: usize,
+    pub first: u32,
     /// One past its last.
-    end: usize,
+    pub end: u32,
+}
+
+impl Block {
+    #[inline]
+    pub(super) fn bounded(&self) -> Bounded<'_> {
+        Bounded { bounds: &self.bounds, shape: &self.shape }
+    }
 }
 
 /// Bounds of a tile at one path. Pixels without nodes take no memory: deep paths have few.
@@ -193,68 +284,198 @@ pub(super) struct PathBounds {
     /// Square of the radius of each row's line, 0 if it draws none.
     pub radius_squared: Column<f32>,
     /// The whole tile's.
-    pub bounds: Bounds,
+    bounds: Bounds,
+    shape: Shape,
     /// Blocks that have nodes, row by row.
     pub blocks: Vec<Block>,
-    /// The blocks' pixels, block by block, in each by best rank: the search cuts off at the first that is too low.
-    pixels: Vec<PixelNodes>,
+    /// The blocks' pixels, block by block, in each row by row.
+    pub pixels: Vec<PixelNodes>,
+    /// Of the same pixels; nothing where no test reads it.
+    shapes: Vec<Shape>,
+    /// For each block its pixels from the highest best rank down, counted from its first: the search cuts off at the
+    /// first that is too low.
+    pub by_rank: Vec<u8>,
 }
 
 impl PathBounds {
     fn new(buffer: &SampleBuffer, nodes: &NodeColumns, rules: &Rules) -> Self {
-        let radius_squared = radii_squared(&nodes.line_width, rules);
+        let mut all = Self {
+            path: nodes.path,
+            radius_squared: radii_squared(&nodes.line_width, rules),
+            bounds: Bounds::EMPTY,
+            shape: Shape::EMPTY,
+            blocks: Vec::new(),
+            pixels: Vec::new(),
+            shapes: Vec::new(),
+            by_rank: Vec::new(),
+        };
         let rect = buffer.rect;
-        let (mut blocks, mut pixels) = (Vec::new(), Vec::new());
-        for y0 in (rect.y0..rect.y1).step_by(BLOCK) {
-            for x0 in (rect.x0..rect.x1).step_by(BLOCK) {
-                let block = PixelRect { x0, y0, x1: x0 + BLOCK as i32, y1: y0 + BLOCK as i32 }.intersection(&rect);
-                let first = pixels.len();
-                for y in block.y0..block.y1 {
-                    for pixel in (block.x0..block.x1).map(|x| [x, y]) {
-                        let rows = nodes.rows(buffer.pixel_number(pixel));
-                        if rows.is_empty() {
-                            continue;
-                        }
-                        let (first, end) = (rows.start as u32, rows.end as u32);
-                        let bounds = rows
-                            .map(|row| {
-                                let rank = Rank { priority: nodes.priority.get(row), depth: nodes.depth.get(row) };
-                                Bounds::of_node(&features(nodes, row), rank, radius_squared.get(row))
-                            })
-                            .fold(Bounds::EMPTY, |all, one| all.union(&one));
-                        pixels.push(PixelNodes { pixel, first, end, bounds });
-                    }
+        for y0 in (rect.y0..rect.y1).step_by(BLOCK as usize) {
+            for x0 in (rect.x0..rect.x1).step_by(BLOCK as usize) {
+                let block = PixelRect { x0, y0, x1: x0 + BLOCK, y1: y0 + BLOCK }.intersection(&rect);
+                all.add_block(block, buffer, nodes, rules);
+            }
+        }
+        all
+    }
+
+    fn add_block(&mut self, rect: PixelRect, buffer: &SampleBuffer, nodes: &NodeColumns, rules: &Rules) {
+        let tests = rules.tests();
+        let first = self.pixels.len();
+        for y in rect.y0..rect.y1 {
+            for pixel in (rect.x0..rect.x1).map(|x| [x, y]) {
+                let rows = nodes.rows.of_pixel(buffer.pixel_number(pixel));
+                if rows.is_empty() {
+                    continue;
                 }
-                if pixels.len() > first {
-                    let bounds = pixels[first..].iter().fold(Bounds::EMPTY, |all, pixel| all.union(&pixel.bounds));
-                    pixels[first..].sort_by(|a, b| a.bounds.best.compare(b.bounds.best));
-                    blocks.push(Block { rect: block, bounds, first, end: pixels.len() });
+                let (start, end) = (rows.start, rows.end);
+                let (first, last) = (start as u32, end as u32);
+                self.pixels.push(PixelNodes {
+                    pixel,
+                    first,
+                    end: last,
+                    bounds: self.of_rows(nodes, start, end, rules),
+                });
+                if tests.reads_shapes {
+                    self.shapes.push(shape_of_rows(nodes, start, end, tests));
                 }
             }
         }
-        let bounds = blocks.iter().fold(Bounds::EMPTY, |all, block: &Block| all.union(&block.bounds));
-        Self { path: nodes.path, radius_squared, bounds, blocks, pixels }
+        let pixels = &self.pixels[first..];
+        if pixels.is_empty() {
+            return;
+        }
+        let bounds = pixels.iter().fold(Bounds::EMPTY, |all, pixel| all.union(&pixel.bounds, nodes));
+        let shape = self.shapes.get(first..).unwrap_or_default().iter().fold(Shape::EMPTY, |all, one| all.union(one));
+        let start = self.by_rank.len();
+        self.by_rank.extend((0..).take(pixels.len()).map(|index: u8| index));
+        self.by_rank[start..].sort_unstable_by_key(|&index| (pixels[usize::from(index)].bounds.best, index));
+        self.bounds = self.bounds.union(&bounds, nodes);
+        self.shape = self.shape.union(&shape);
+        self.blocks.push(Block { rect, bounds, shape, first: first as u32, end: self.pixels.len() as u32 });
     }
 
-    pub(super) fn pixels(&self, block: &Block) -> &[PixelNodes] {
-        &self.pixels[block.first..block.end]
+    /// Column by column: most are constant.
+    fn of_rows(&self, nodes: &NodeColumns, first: usize, end: usize, rules: &Rules) -> Bounds {
+        let mut bounds = Bounds { object: range(&nodes.object, first, end), ..Bounds::EMPTY };
+        bounds.shader = range(&nodes.shader, first, end);
+        if let (Column::Constant(priority), Column::Values(depths)) = (&nodes.priority, &nodes.depth) {
+            let (mut low, mut high) = (f32::INFINITY, f32::NEG_INFINITY);
+            for &depth in &depths[first..end] {
+                low = low.min(depth);
+                high = high.max(depth);
+            }
+            bounds.highest = Rank::new(*priority, low);
+            bounds.lowest = Rank::new(*priority, high);
+        } else {
+            for row in first..end {
+                let rank = Rank::new(nodes.priority.get(row), nodes.depth.get(row));
+                bounds.highest = bounds.highest.better(rank);
+                bounds.lowest = bounds.lowest.worse(rank);
+            }
+        }
+        let (mut narrow, mut wide) = (f32::INFINITY, 0.0_f32);
+        match &self.radius_squared {
+            Column::Constant(radius) => (narrow, wide) = (*radius, *radius),
+            radii => {
+                for radius in (first..end).map(|row| radii.get(row)) {
+                    narrow = narrow.min(radius);
+                    wide = wide.max(radius);
+                }
+            }
+        }
+        bounds.radius_squared = wide;
+        if narrow > 0.0 {
+            bounds.best = bounds.highest;
+            bounds.thinnest_squared = narrow;
+        } else if wide > 0.0 {
+            for row in first..end {
+                let radius = self.radius_squared.get(row);
+                if radius > 0.0 {
+                    bounds.best = bounds.best.better(Rank::new(nodes.priority.get(row), nodes.depth.get(row)));
+                    bounds.thinnest_squared = bounds.thinnest_squared.min(radius);
+                }
+            }
+        }
+        bounds.stylist = self.stylist(nodes, first, end, rules);
+        bounds
     }
+
+    fn stylist(&self, nodes: &NodeColumns, first: usize, end: usize, rules: &Rules) -> Stylist {
+        let Some(row) = (first..end).find(|row| self.radius_squared.get(*row) > 0.0) else { return Stylist::None };
+        let own = style(nodes, row);
+        // What is seen through a line depends on the pair.
+        let opaque = own.is_opaque(rules);
+        let alike = match (&nodes.line_color, &nodes.line_width, &nodes.line_opacity) {
+            (Column::Constant(_), Column::Constant(_), Column::Constant(_)) => opaque,
+            _ => opaque && (row + 1..end).all(|row| self.radius_squared.get(row) <= 0.0 || style(nodes, row) == own),
+        };
+        if alike { Stylist::Alike(row as u32) } else { Stylist::Many }
+    }
+
+    pub(super) fn bounded(&self) -> Bounded<'_> {
+        Bounded { bounds: &self.bounds, shape: &self.shape }
+    }
+
+    /// The bounds of a pixel, by its place in [`Self::pixels`].
+    #[inline]
+    pub(super) fn of_pixel(&self, place: usize) -> Bounded<'_> {
+        Bounded { bounds: &self.pixels[place].bounds, shape: self.shapes.get(place).unwrap_or(&Shape::EMPTY) }
+    }
+}
+
+/// Smallest and largest id of some rows.
+fn range(ids: &Column<u32>, first: usize, end: usize) -> [u32; 2] {
+    match ids {
+        Column::Constant(id) => [*id; 2],
+        ids => {
+            let (mut low, mut high) = (u32::MAX, 0);
+            for id in (first..end).map(|row| ids.get(row)) {
+                low = low.min(id);
+                high = high.max(id);
+            }
+            [low, high]
+        }
+    }
+}
+
+/// The shape of some rows, as far as tests read it.
+fn shape_of_rows(nodes: &NodeColumns, first: usize, end: usize, tests: &Tests) -> Shape {
+    let hits = |row: &usize| nodes.object.get(*row) != 0;
+    Shape {
+        uv: extent(&nodes.uv, first, end, tests.uv_squared, hits),
+        normal: extent(&nodes.normal, first, end, tests.chord_squared, hits),
+        feature: extent(&nodes.feature, first, end, tests.feature, hits),
+    }
+}
+
+fn extent<const N: usize>(
+    column: &Column<[f32; N]>,
+    first: usize,
+    end: usize,
+    threshold: f32,
+    hits: impl Fn(&usize) -> bool,
+) -> Extent<N> {
+    let mut extent = Extent::EMPTY;
+    if threshold == f32::INFINITY {
+        return extent;
+    }
+    for row in (first..end).filter(hits) {
+        extent = extent.union(&Extent::point(column.get(row)));
+        if matches!(column, Column::Constant(_)) {
+            break;
+        }
+    }
+    extent
 }
 
 /// The squared radius of each row's line. Widths mostly come in runs.
 fn radii_squared(widths: &Column<f32>, rules: &Rules) -> Column<f32> {
-    let squared = |width: f32| rules.radius(width) * rules.radius(width);
-    match widths {
-        Column::Constant(width) => Column::Constant(squared(*width)),
-        Column::Values(widths) => {
-            let mut last = (0.0, squared(0.0));
-            let of = |&width: &f32| {
-                if width != last.0 {
-                    last = (width, squared(width));
-                }
-                last.1
-            };
-            Column::Values(widths.iter().map(of).collect())
+    let mut last = (0.0, 0.0);
+    widths.map(|width| {
+        if width != last.0 {
+            last = (width, rules.radius(width) * rules.radius(width));
         }
-    }
+        last.1
+    })
 }

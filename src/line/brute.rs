@@ -1,6 +1,6 @@
 //! The definition as plain loops (DESIGN section 3.2), to be read beside the text. The oracle of [`super::search`].
 
-use super::pair::{Found, Pair, distance_squared};
+use super::pair::{Found, MOST_LINES, Pair, Taken, distance_squared};
 use super::window::{PathTile, PathWindow};
 use super::{LineCounts, Rules};
 use crate::sample::PixelRect;
@@ -14,25 +14,41 @@ pub(super) fn find(
     counts: &mut LineCounts,
 ) -> Vec<Found> {
     let mut found = Vec::new();
-    for (row, &sample) in targets.nodes.sample.iter().enumerate() {
-        if lined[sample as usize] {
+    for row in 0..targets.nodes.rows.len() {
+        if lined[targets.nodes.rows.sample(row) as usize] {
             continue;
         }
-        let pair = seen(window, targets, row, rules, counts);
-        found.extend(pair.map(|pair| Found { row, path: targets.nodes.path, pair }));
+        let mut taken = Taken::default();
+        let mut pairs = Vec::new();
+        while pairs.len() < MOST_LINES
+            && let Some(pair) = seen(window, targets, row, &taken, rules, counts)
+        {
+            pairs.push(pair);
+            // Through a line that is not opaque, the next is seen.
+            let Some(neighbors) = &window.tiles[pair.tile as usize] else { break };
+            let (nodes, styling) = if pair.own { (targets, row) } else { (neighbors, pair.row as usize) };
+            if nodes.alpha(styling, rules) >= 1.0 {
+                break;
+            }
+            taken.take(&neighbors.features(pair.row as usize), pair.own);
+        }
+        if let Some((pair, behind)) = pairs.split_first() {
+            found.push(Found { row, path: targets.nodes.path, pair: *pair, behind: behind.to_vec() });
+        }
     }
     found
 }
 
-/// The pair that the target of a row sees.
+/// The pair that the target of a row sees, but for lines that are taken.
 fn seen(
     window: &PathWindow<'_>,
     targets: &PathTile<'_>,
     row: usize,
+    taken: &Taken,
     rules: &Rules,
     counts: &mut LineCounts,
 ) -> Option<Pair> {
-    let [x, y] = targets.buffer.pixel_of(targets.nodes.sample[row]);
+    let [x, y] = targets.buffer.pixel_of(targets.nodes.rows.sample(row));
     let t = targets.node([x, y], row);
     let mut seen: Option<Pair> = None;
 
@@ -40,7 +56,7 @@ fn seen(
     for segment in window.segments(PixelRect { x0: x, y0: y, x1: x + 1, y1: y + 1 }.grown(rules.reach())) {
         let tile = segment.tile;
         for pixel in (segment.x0..segment.x1).map(|x| [x, segment.y]) {
-            for row in tile.nodes.rows(tile.buffer.pixel_number(pixel)) {
+            for row in tile.nodes.rows.of_pixel(tile.buffer.pixel_number(pixel)) {
                 let n = tile.node(pixel, row);
                 counts.pairs_tested += 1;
 
@@ -51,13 +67,17 @@ fn seen(
                 // the priority sample p: the larger explicit priority, else the shorter depth, else t.
                 let own = !n.rank.outranks(t.rank);
                 let p = if own { &t } else { &n };
+                if taken.contains(&n.features, own) {
+                    continue;
+                }
                 // The pair is valid if |x_t − x_n| < r'.
                 let distance_squared = distance_squared(&t, n.pixel, n.offset);
                 if distance_squared >= p.radius_squared {
                     continue;
                 }
                 // Of all valid pairs the seen one minimises −priority_p, depth_p, |x_t − x_n|, index of n.
-                let pair = Pair { rank: p.rank, distance_squared, pixel, tile: segment.index, row, own };
+                let pair =
+                    Pair { rank: p.rank, distance_squared, pixel, tile: segment.index as u32, row: row as u32, own };
                 if seen.is_none_or(|best| pair.beats(&best)) {
                     seen = Some(pair);
                 }

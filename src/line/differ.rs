@@ -59,17 +59,22 @@ pub(super) struct Tests {
     pub chord_squared: f32,
     /// Largest difference of a channel that is no difference.
     pub feature: f32,
+    /// Whether any of the last three is on.
+    pub reads_shapes: bool,
 }
 
 impl Tests {
     pub(super) fn new(settings: &LineSettings) -> Self {
-        Self {
+        let mut tests = Self {
             object: settings.object,
             shader: settings.shader,
             uv_squared: settings.uv.map_or(f32::INFINITY, |distance| distance.max(0.0) * distance.max(0.0)),
             chord_squared: settings.normal.map_or(f32::INFINITY, chord_squared),
             feature: settings.feature.map_or(f32::INFINITY, |difference| difference.max(0.0)),
-        }
+            reads_shapes: false,
+        };
+        tests.reads_shapes = tests.uv_squared.min(tests.chord_squared).min(tests.feature) < f32::INFINITY;
+        tests
     }
 
     /// Whether any test finds a difference.

@@ -6,11 +6,14 @@
 //! size, threads and method change no bit.
 //!
 //! `brute` is the definition as plain loops and the oracle for `search`, which gives the same bits much sooner. What
-//! decides is shared by both: `differ`, `pair`, [`Rules`].
+//! decides is shared by both: `differ`, `pair`, [`Rules`]. `bounds` and `lanes` are the search's: what is known of many nodes
+//! at once, and the loops over neighbours that are left.
 
+mod baselines;
 mod bounds;
 mod brute;
 mod differ;
+mod lanes;
 mod pair;
 mod rules;
 mod search;
@@ -23,9 +26,10 @@ pub use rules::Rules;
 pub use window::{LineTile, Window};
 
 use crate::sample::{NodePath, PixelRect};
+use pair::LineNode;
 use window::PathTile;
 
-/// How lines are searched. Both give the same lines, bit for bit.
+/// How lines are searched. The first two give the same lines, bit for bit; the others are methods to compare with.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Method {
     /// Bounds and cut-offs.
@@ -33,6 +37,10 @@ pub enum Method {
     Exact,
     /// Every neighbour of every sample.
     Brute,
+    /// Choudhury and Parker 2009: one style, opacity by the part of the stencil that differs; camera nodes only.
+    Choudhury,
+    /// Bauer 2017: one style, a contour image of sub-pixels; camera nodes only.
+    Bauer,
 }
 
 /// What kind of feature a line marks (DESIGN section 3.6), by the strongest reason, in this order.
@@ -52,12 +60,13 @@ pub enum LineType {
     Feature,
 }
 
-/// The line that a sample sees.
+/// The line that a sample sees. With [`Rules::with_any_pair`], `fired`, `neighbor` and `own` may be those of another pair
+/// that looks the same.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SeenLine {
     /// The line's colour, tinted if the rules say so.
     pub color: [f32; 3],
-    /// min(1, width / minimum width).
+    /// min(1, width / minimum width) times the line's opacity; with what is seen through it, if that is below 1.
     pub alpha: f32,
     /// The sample's colour with the line in it.
     pub lined: [f32; 3],
@@ -105,6 +114,10 @@ impl std::ops::AddAssign for LineCounts {
 ///
 /// The paths are taken in breadth-first order, each only for samples that have no line yet and have a node there
 /// (OG18 section 3.4).
+///
+/// A line that is not opaque (thinner than the minimum width, or with an opacity) shows the next one in the order of keys,
+/// and so on until they are opaque. Each surface (object and material) draws or borders at most one of a sample's lines at
+/// a path, else the many pairs that see one edge would count as many lines; there are at most 8.
 #[must_use]
 pub fn find_lines(window: &Window<'_>, target: LineTile<'_>, rules: &Rules, method: Method) -> LineBuffer {
     let mut lined = vec![false; target.buffer.samples()];
@@ -116,9 +129,17 @@ pub fn find_lines(window: &Window<'_>, target: LineTile<'_>, rules: &Rules, meth
         let found = match method {
             Method::Exact => search::find(&window, &targets, &lined, rules, &mut counts),
             Method::Brute => brute::find(&window, &targets, &lined, rules, &mut counts),
+            Method::Choudhury => {
+                lines = baselines::choudhury(&window, &targets, rules, &mut counts);
+                break;
+            }
+            Method::Bauer => {
+                lines = baselines::bauer(&window, &targets, rules, &mut counts);
+                break;
+            }
         };
         for found in found {
-            let sample = nodes.sample[found.row];
+            let sample = nodes.rows.sample(found.row);
             if let Some(line) = style::style(&window, &targets, &found, rules) {
                 lined[sample as usize] = true;
                 lines.push((sample, line));

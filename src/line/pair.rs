@@ -1,37 +1,60 @@
 //! One target and one neighbour: who styles the line, whether it is valid, and which of two valid pairs is seen
 //! (DESIGN section 3.2). Everything here is shared by the oracle and the search, so they cannot disagree by a rounding.
 
-use std::cmp::Ordering;
-
 use super::differ::Features;
 use crate::sample::NodePath;
 
 /// What orders nodes along the line of sight: explicit priority first, then the shorter depth.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Rank {
-    pub priority: i32,
-    pub depth: f32,
-}
+///
+/// Both in one number, since ranks are compared more often than anything else here: the priority above the depth, each
+/// as bits whose order is its own, the topmost node first.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct Rank(u64);
 
 impl Rank {
     /// Outranked by all, or equal: that of a miss.
-    pub(super) const LAST: Self = Self { priority: i32::MIN, depth: f32::INFINITY };
+    pub(super) const LAST: Self = Self::new(i32::MIN, f32::INFINITY);
 
-    #[inline]
-    pub(super) fn outranks(self, other: Self) -> bool {
-        self.priority > other.priority || (self.priority == other.priority && self.depth < other.depth)
+    /// Outranks all but nodes of the highest priority there is.
+    pub(super) const FIRST: Self = Self(0);
+
+    /// The rank of a node. The depth is not NaN and no negative zero, as behind the gate.
+    #[inline(always)]
+    pub(super) const fn new(priority: i32, depth: f32) -> Self {
+        const SIGN: u32 = 1 << 31;
+        let priority = !(priority as u32 ^ SIGN);
+        let bits = depth.to_bits();
+        let depth = if bits & SIGN == 0 { bits | SIGN } else { !bits };
+        Self((priority as u64) << 32 | depth as u64)
     }
 
-    /// The order in which lines cover each other, the topmost first.
-    #[inline]
-    pub(super) fn compare(self, other: Self) -> Ordering {
-        other.priority.cmp(&self.priority).then(self.depth.total_cmp(&other.depth))
+    /// The priority as bits: fewer outrank more.
+    #[inline(always)]
+    pub(super) fn priority_bits(self) -> u32 {
+        (self.0 >> 32) as u32
+    }
+
+    /// The depth as bits: fewer outrank more.
+    #[inline(always)]
+    pub(super) fn depth_bits(self) -> u32 {
+        self.0 as u32
+    }
+
+    #[inline(always)]
+    pub(super) fn outranks(self, other: Self) -> bool {
+        self.0 < other.0
     }
 
     /// The one that outranks the other.
-    #[inline]
+    #[inline(always)]
     pub(super) fn better(self, other: Self) -> Self {
-        if other.outranks(self) { other } else { self }
+        Self(self.0.min(other.0))
+    }
+
+    /// The one that is outranked by the other.
+    #[inline(always)]
+    pub(super) fn worse(self, other: Self) -> Self {
+        Self(self.0.max(other.0))
     }
 }
 
@@ -52,7 +75,7 @@ pub(super) struct LineNode {
 ///
 /// Whole pixels are subtracted as integers, so a line is drawn alike everywhere in a large picture. Squares are compared
 /// instead of distances throughout.
-#[inline]
+#[inline(always)]
 pub(super) fn distance_squared(target: &LineNode, pixel: [i32; 2], offset: [f32; 2]) -> f32 {
     let along = |axis: usize| (pixel[axis] - target.pixel[axis]) as f32 + (offset[axis] - target.offset[axis]);
     let (x, y) = (along(0), along(1));
@@ -69,9 +92,9 @@ pub(super) struct Pair {
     /// The neighbour's pixel.
     pub pixel: [i32; 2],
     /// The neighbour's tile in the window.
-    pub tile: usize,
+    pub tile: u32,
     /// The neighbour's row in its tile.
-    pub row: usize,
+    pub row: u32,
     /// Whether the target is the priority sample.
     pub own: bool,
 }
@@ -93,11 +116,69 @@ impl Pair {
 }
 
 /// The line that a target sees, before styling.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Found {
     /// The target's row at the path.
     pub row: usize,
     /// The path.
     pub path: NodePath,
     pub pair: Pair,
+    /// What is seen through it, front to back, if it is not opaque.
+    pub behind: Vec<Pair>,
+}
+
+/// Most lines of a sample, one behind the other.
+pub(super) const MOST_LINES: usize = 8;
+
+/// The lines of a target that were already seen, from the front. Each surface (object and material) draws or borders at
+/// most one of them: an edge is one line, however many pairs see it.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Taken {
+    neighbors: Vec<(u32, u32)>,
+    own: bool,
+}
+
+impl Taken {
+    /// Takes the line of a pair with a neighbour of these features.
+    pub(super) fn take(&mut self, neighbor: &Features, own: bool) {
+        self.neighbors.push((neighbor.object, neighbor.shader));
+        self.own |= own;
+    }
+
+    /// Whether a pair belongs to a line that is taken.
+    pub(super) fn contains(&self, neighbor: &Features, own: bool) -> bool {
+        (own && self.own) || self.neighbors.contains(&(neighbor.object, neighbor.shader))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ranks_are_ordered_by_priority_and_then_by_depth() {
+        let descending = [
+            (i32::MAX, 0.0),
+            (i32::MAX, f32::MAX),
+            (1, 5.0),
+            (0, -1e9),
+            (0, -1.0),
+            (0, 0.0),
+            (0, 1e-40),
+            (0, 1.0),
+            (0, 1.000_000_1),
+            (0, f32::MAX),
+            (-1, 0.0),
+            (i32::MIN, 3.0),
+            (i32::MIN, f32::INFINITY),
+        ]
+        .map(|(priority, depth)| Rank::new(priority, depth));
+        for (i, a) in descending.iter().enumerate() {
+            for (j, b) in descending.iter().enumerate() {
+                assert_eq!(a.outranks(*b), i < j, "{i} and {j}");
+            }
+        }
+        assert_eq!(descending[12], Rank::LAST);
+        assert!(Rank::FIRST.outranks(descending[0]));
+    }
 }

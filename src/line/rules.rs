@@ -14,6 +14,7 @@ pub struct Rules {
     /// Mean gap to the nearest sample beyond an edge, for a half width of 1 px.
     unit_gap: f64,
     tests: Tests,
+    exact_pairs: bool,
 }
 
 impl Rules {
@@ -28,6 +29,7 @@ impl Rules {
             widest: settings.max_width.max(0.0),
             unit_gap: f64::from(unit_gap),
             tests: Tests::new(settings),
+            exact_pairs: true,
             settings: settings.clone(),
         }
     }
@@ -40,10 +42,28 @@ impl Rules {
         self
     }
 
+    /// The same rules for callers to whom only the looks of lines matter: colours, alpha and path are those of the pair
+    /// that is seen, but the neighbour and the tests that fired may be those of another that looks alike. Where all
+    /// lines near by have one style, the search then stops at the first.
+    #[must_use]
+    pub fn with_any_pair(mut self) -> Self {
+        self.exact_pairs = false;
+        self
+    }
+
+    pub(super) fn exact_pairs(&self) -> bool {
+        self.exact_pairs
+    }
+
     /// The settings that the rules were made from.
     #[must_use]
     pub fn settings(&self) -> &LineSettings {
         &self.settings
+    }
+
+    /// Widths above this count as this.
+    pub(super) fn widest(&self) -> f32 {
+        self.widest
     }
 
     pub(super) fn tests(&self) -> &Tests {

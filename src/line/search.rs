@@ -1,26 +1,41 @@
 //! The exact search: the same lines as [`super::brute`], bit for bit, without looking at most pairs.
 //!
 //! Pairs fall in two kinds. Where the neighbour outranks the target, the line is the neighbour's: the pair of highest rank
-//! is seen. Only where there is none, the line is the target's own: the nearest pair is seen. So for each target
+//! is seen. Only where there is none, the line is the target's own: the nearest pair is seen. The targets of one pixel are
+//! searched together:
 //!
-//! 1. blocks, and in them pixels, are visited from the highest rank down, until what remains is outranked by the pair
-//!    already found or by the target itself;
-//! 2. if that found nothing and the target draws lines, the blocks are visited for the nearest neighbour that differs.
+//! 1. Blocks that cannot matter to the pixel are left out: nothing in them can differ, or they are too far for the widest
+//!    line in them. Most pixels of a picture end here.
+//! 2. For lines of neighbours, the *floor* is the rank that every target of the pixel is sure to see or to outdo: the
+//!    lowest of the targets' own ranks and of the lines that the last pixel's answer gives them. Pixels are visited from
+//!    the highest rank down; one that surely differs, is surely in reach and surely outranks raises the floor. What the
+//!    floor outranks is never looked at. A handful of pixels remains, mostly on the rim of the stencil.
+//! 3. For own lines, the *limit* is the distance within which every target is sure to find its nearest neighbour: that of
+//!    the last pixel's answer, or the far side of a pixel that surely differs. Only pixels nearer than that are looked at.
+//! 4. Each target goes through what remains, best first, until what it has found cannot be beaten.
 //!
-//! What cannot matter is left out at five levels, each time because nothing in it can differ or because it is too far for
-//! the widest line in it: blocks for a block of targets (where most of a picture ends), blocks and pixels for a pixel of
-//! targets, blocks and pixels for a target. The pair that the previous target saw is tried first: it is often this one's
-//! too, and then its rank and distance cut off nearly all the rest.
+//! Where callers only ask how lines look ([`Rules::with_any_pair`]), a target is done as soon as it has a pair whose style
+//! is that of all lines that could still win; its own line looks the same whichever neighbour it is found by.
 //!
-//! Measured on `tests/bench/line_search.rs`, nanoseconds per sample at (1 px, 16 samples), (16 px, 16) and (16 px, 64):
-//! each target going through all pixels of a near block 46, 342, 738; pixels sifted once per pixel of targets 19, 241, 740;
-//! and distances compared before anything else is read of a neighbour (as it is now) 18, 178, 494.
+//! Measured with `tests/bench/line_search.rs --quick`, nanoseconds per sample at (16 px, 64 samples), (32 px, 16) and
+//! (32 px, 64), of which 24 %, 47 % and 47 % are lined:
+//!
+//! - targets one by one through sorted pixels, floor and limit shared, neighbours tested one at a time: 1217, 981, 3228;
+//! - neighbours gathered into columns, loops not vectorised (a closure that is not inlined): 3157, 2431, more;
+//! - vectorised for SSE2 (the closure of `pulp::Arch::dispatch` was compiled for the baseline): 738, 879, 1872;
+//! - vectorised for what the machine has (AVX-512 here), as it is now: 484, 740, 1176;
+//! - the same, any pair that looks alike: 112, 161, 168.
 
-use super::bounds::{Block, Bounds, PathBounds, PixelNodes};
-use super::pair::{Found, LineNode, Pair, Rank, distance_squared};
-use super::window::{PathTile, PathWindow};
+use super::bounds::{Block, Bounded, PathBounds, PixelNodes, Stylist};
+use super::differ::Tests;
+use super::lanes::{Lanes, Origin};
+use super::pair::{Found, LineNode, MOST_LINES, Pair, Rank, Taken, distance_squared};
+use super::window::{LineStyle, PathTile, PathWindow};
 use super::{LineCounts, Rules};
 use crate::sample::PixelRect;
+
+/// How many neighbours are gathered before the targets are tested with them; each further batch is four times as large.
+const FIRST_BATCH: usize = 128;
 
 /// The line that each target sees which is not yet `lined`, in no particular order.
 pub(super) fn find(
@@ -33,14 +48,21 @@ pub(super) fn find(
     let mut search = Search {
         window,
         rules,
+        tests: rules.tests(),
+        any_pair: !rules.exact_pairs(),
         tiles: Vec::new(),
         near_block: Vec::new(),
         near_pixel: Vec::new(),
-        pixels: Vec::new(),
+        candidates: Vec::new(),
+        certain: false,
+        lanes: Lanes::new(),
+        targets: Vec::new(),
+        last_other: None,
+        last_own: None,
         pairs_tested: 0,
     };
     let mut found = Vec::new();
-    search.collect_tiles(targets);
+    search.collect_tiles(targets, rules.reach());
     if search.tiles.is_empty() {
         return found;
     }
@@ -49,20 +71,12 @@ pub(super) fn find(
         if search.near_block.is_empty() {
             continue;
         }
-        let mut previous = None;
-        for pixel in targets.bounds.pixels(block) {
-            search.collect_for_pixel(pixel);
-            if search.near_pixel.is_empty() {
-                continue;
-            }
-            for row in pixel.first as usize..pixel.end as usize {
-                if lined[targets.nodes.sample[row] as usize] {
-                    continue;
-                }
-                if let Some(pair) = search.seen(pixel, &targets.node(pixel.pixel, row), previous) {
-                    found.push(Found { row, path: targets.nodes.path, pair });
-                    previous = Some(pair);
-                }
+        for place in block.first as usize..block.end as usize {
+            search.search_pixel(targets, place, lined);
+            for i in 0..search.targets.len() {
+                let Target { row, best: Some(pair), .. } = search.targets[i] else { continue };
+                let behind = search.search_behind(targets, place, i, pair);
+                found.push(Found { row, path: targets.nodes.path, pair, behind });
             }
         }
     }
@@ -74,39 +88,92 @@ pub(super) fn find(
 #[derive(Clone, Copy)]
 struct Near<'w> {
     /// Place of its tile in the window.
-    tile: usize,
+    tile: u32,
+    bounds: &'w PathBounds,
     block: &'w Block,
     /// Smallest squared distance from the pixel of targets.
     gap_squared: f32,
-    /// Its pixels in [`Search::pixels`], once they have been sifted for the pixel of targets.
-    sifted: Option<(usize, usize)>,
+}
+
+/// A pixel that may hold neighbours.
+#[derive(Clone, Copy)]
+struct Candidate<'w> {
+    /// Place of its tile in the window.
+    tile: u32,
+    pixel: &'w PixelNodes,
+    /// Smallest squared distance from the pixel of targets.
+    gap_squared: f32,
+    /// Whether all its nodes surely differ from all targets.
+    certain: bool,
+}
+
+/// A target with the best pair found so far.
+struct Target {
+    row: usize,
+    node: LineNode,
+    style: LineStyle,
+    opaque: bool,
+    best: Option<Pair>,
+}
+
+impl Target {
+    /// Whether a neighbour of this rank may outrank the target and all that was found so far.
+    #[inline(always)]
+    fn may_win(&self, rank: Rank) -> bool {
+        rank.outranks(self.node.rank) && self.best.is_none_or(|best| !best.rank.outranks(rank))
+    }
+
+    /// Whether the target has no better line than its own, if it draws one.
+    fn wants_own(&self) -> bool {
+        self.node.radius_squared > 0.0 && self.best.is_none_or(|best| best.own)
+    }
+
+    /// The squared distance from which on a neighbour gives no better own line.
+    #[inline(always)]
+    fn too_far(&self, distance_squared: f32) -> bool {
+        match self.best {
+            Some(best) => distance_squared > best.distance_squared,
+            None => distance_squared >= self.node.radius_squared,
+        }
+    }
 }
 
 /// Scratch of one search, narrowed from level to level.
 struct Search<'w, 'a> {
     window: &'w PathWindow<'a>,
     rules: &'w Rules,
+    tests: &'w Tests,
+    /// Whether any pair will do that looks like the one that is seen.
+    any_pair: bool,
     /// Tiles that may hold neighbours of the tile of targets.
-    tiles: Vec<(usize, &'w PathTile<'a>)>,
+    tiles: Vec<(u32, &'w PathTile<'a>)>,
     /// Blocks that may hold neighbours of the current block of targets.
     near_block: Vec<Near<'w>>,
-    /// Those that may hold neighbours of the current pixel of targets, by best rank, then by distance.
+    /// Those that may hold neighbours of the current pixel of targets.
     near_pixel: Vec<Near<'w>>,
-    /// Pixels of those blocks that may hold neighbours of the current pixel of targets, block by block, in each by best
-    /// rank.
-    pixels: Vec<&'w PixelNodes>,
+    /// Pixels of those blocks that may hold what is searched.
+    candidates: Vec<Candidate<'w>>,
+    /// Whether all their nodes surely differ from all targets.
+    certain: bool,
+    /// Nodes of the candidates.
+    lanes: Lanes,
+    /// The targets of the current pixel.
+    targets: Vec<Target>,
+    /// The last line of a neighbour that was found: likely the next one, too.
+    last_other: Option<Pair>,
+    /// The last own line.
+    last_own: Option<Pair>,
     pairs_tested: u64,
 }
 
 impl<'w> Search<'w, '_> {
-    fn collect_tiles(&mut self, targets: &PathTile<'_>) {
-        let reach = targets.buffer.rect.grown(self.rules.reach());
-        let tests = self.rules.tests();
-        self.tiles.extend(
-            self.window
-                .tiles_in(reach)
-                .filter(|(_, tile)| targets.bounds.bounds.may_differ(&tile.bounds.bounds, tests)),
-        );
+    fn collect_tiles(&mut self, targets: &PathTile<'_>, reach: i32) {
+        let bounded = targets.bounds.bounded();
+        for (index, tile) in self.window.tiles_in(targets.buffer.rect.grown(reach)) {
+            if bounded.may_differ(&tile.bounds.bounded(), self.tests) {
+                self.tiles.push((index as u32, tile));
+            }
+        }
     }
 
     fn collect_blocks(&mut self, targets: &Block) {
@@ -114,188 +181,377 @@ impl<'w> Search<'w, '_> {
         for &(tile, nodes) in &self.tiles {
             let bounds: &'w PathBounds = nodes.bounds;
             for block in &bounds.blocks {
-                if self.may_matter(&targets.rect, &targets.bounds, &block.rect, &block.bounds).is_some() {
-                    self.near_block.push(Near { tile, block, gap_squared: 0.0, sifted: None });
+                let gap_squared = rect_gap_squared(&targets.rect, &block.rect);
+                if may_matter(&targets.bounded(), &block.bounded(), gap_squared, self.tests) {
+                    self.near_block.push(Near { tile, bounds, block, gap_squared });
                 }
             }
         }
     }
 
-    fn collect_for_pixel(&mut self, targets: &PixelNodes) {
-        let rect = pixel_rect(targets.pixel);
-        let mut near = std::mem::take(&mut self.near_pixel);
-        near.clear();
-        for &candidate in &self.near_block {
-            let block = candidate.block;
-            if let Some(gap_squared) = self.may_matter(&rect, &targets.bounds, &block.rect, &block.bounds) {
-                near.push(Near { gap_squared, ..candidate });
+    /// Leaves the targets of a pixel, with what they see, in [`Self::targets`].
+    fn search_pixel(&mut self, nodes: &PathTile<'_>, place: usize, lined: &[bool]) {
+        let pixel = &nodes.bounds.pixels[place];
+        let bounded = nodes.bounds.of_pixel(place);
+        self.targets.clear();
+        self.near_pixel.clear();
+        let rect = pixel_rect(pixel.pixel);
+        for near in &self.near_block {
+            let gap_squared = rect_gap_squared(&rect, &near.block.rect);
+            if may_matter(&bounded, &near.block.bounded(), gap_squared, self.tests) {
+                self.near_pixel.push(Near { gap_squared, ..*near });
             }
         }
-        near.sort_unstable_by(|a, b| {
-            let by_rank = a.block.bounds.best.compare(b.block.bounds.best);
-            by_rank.then(a.gap_squared.total_cmp(&b.gap_squared))
-        });
-        self.near_pixel = near;
-        self.pixels.clear();
-    }
-
-    /// The pixels of a near block that may hold neighbours of the pixel of targets, as a range of [`Self::pixels`].
-    ///
-    /// Sifted when the first target asks: for most pixels of targets, ranks and distances found so far cut off most
-    /// blocks before.
-    fn sifted(&mut self, near: usize, targets: &PixelNodes) -> (usize, usize) {
-        let Near { tile, block, sifted, .. } = self.near_pixel[near];
-        if let Some(range) = sifted {
-            return range;
-        }
-        let first = self.pixels.len();
-        if let Some(nodes) = &self.window.tiles[tile] {
-            let bounds: &'w PathBounds = nodes.bounds;
-            for pixel in bounds.pixels(block) {
-                let [target, neighbor] = [targets.pixel, pixel.pixel].map(pixel_rect);
-                if self.may_matter(&target, &targets.bounds, &neighbor, &pixel.bounds).is_some() {
-                    self.pixels.push(pixel);
-                }
-            }
-        }
-        let range = (first, self.pixels.len());
-        self.near_pixel[near].sifted = Some(range);
-        range
-    }
-
-    /// The smallest squared distance between targets and neighbours of two rectangles, if they may make lines.
-    #[inline]
-    fn may_matter(
-        &self,
-        target_rect: &PixelRect,
-        targets: &Bounds,
-        neighbor_rect: &PixelRect,
-        neighbors: &Bounds,
-    ) -> Option<f32> {
-        let gap_squared = rect_gap_squared(target_rect, neighbor_rect);
-        let near = gap_squared < targets.radius_squared.max(neighbors.radius_squared);
-        (near && targets.may_differ(neighbors, self.rules.tests())).then_some(gap_squared)
-    }
-
-    /// The pair that a target sees.
-    fn seen(&mut self, targets: &PixelNodes, t: &LineNode, guess: Option<Pair>) -> Option<Pair> {
-        let as_bounds = Bounds::of_node(&t.features, t.rank, t.radius_squared);
-        let mut best = None;
-        if let Some(Pair { tile, pixel, row, .. }) = guess {
-            self.pairs_tested += 1;
-            self.test(t, tile, pixel, row, &mut best);
-        }
-        self.search_outranking(targets, t, &as_bounds, &mut best);
-        if best.is_none_or(|pair: Pair| pair.own) && t.radius_squared > 0.0 {
-            self.search_nearest(targets, t, &as_bounds, &mut best);
-        }
-        best
-    }
-
-    /// Looks for the highest-ranking valid pair whose neighbour outranks the target.
-    fn search_outranking(&mut self, targets: &PixelNodes, t: &LineNode, as_bounds: &Bounds, best: &mut Option<Pair>) {
-        let tests = self.rules.tests();
-        for i in 0..self.near_pixel.len() {
-            let Near { tile, block, .. } = self.near_pixel[i];
-            // Sorted by rank: no later block can win either.
-            if !may_win(t, best, block.bounds.best) {
-                break;
-            }
-            let gap_squared = target_gap_squared(t, &block.rect);
-            if gap_squared >= block.bounds.radius_squared || !as_bounds.may_differ(&block.bounds, tests) {
-                continue;
-            }
-            let Some(nodes) = &self.window.tiles[tile] else { continue };
-            let (first, end) = self.sifted(i, targets);
-            for pixel in first..end {
-                let pixel = self.pixels[pixel];
-                if !may_win(t, best, pixel.bounds.best) {
-                    break;
-                }
-                let gap_squared = target_gap_squared(t, &pixel_rect(pixel.pixel));
-                if gap_squared >= pixel.bounds.radius_squared
-                    || loses_by_distance(best, pixel.bounds.best, gap_squared)
-                    || !as_bounds.may_differ(&pixel.bounds, tests)
-                {
-                    continue;
-                }
-                self.pairs_tested += u64::from(pixel.end - pixel.first);
-                for row in pixel.first as usize..pixel.end as usize {
-                    if may_win(t, best, nodes.rank(row))
-                        && distance_squared(t, pixel.pixel, nodes.offset(row)) < pixel.bounds.radius_squared
-                    {
-                        self.test(t, tile, pixel.pixel, row, best);
-                    }
-                }
-            }
-        }
-    }
-
-    /// Looks for the nearest neighbour that differs and does not outrank the target.
-    fn search_nearest(&mut self, targets: &PixelNodes, t: &LineNode, as_bounds: &Bounds, best: &mut Option<Pair>) {
-        let tests = self.rules.tests();
-        let too_far = |best: &Option<Pair>, distance: f32| match best {
-            Some(pair) => distance > pair.distance_squared,
-            None => distance >= t.radius_squared,
-        };
-        for i in 0..self.near_pixel.len() {
-            let Near { tile, block, gap_squared, .. } = self.near_pixel[i];
-            if too_far(best, gap_squared)
-                || block.bounds.worst.outranks(t.rank)
-                || too_far(best, target_gap_squared(t, &block.rect))
-                || !as_bounds.may_differ(&block.bounds, tests)
-            {
-                continue;
-            }
-            let Some(nodes) = &self.window.tiles[tile] else { continue };
-            let (first, end) = self.sifted(i, targets);
-            for pixel in first..end {
-                let pixel = self.pixels[pixel];
-                if too_far(best, target_gap_squared(t, &pixel_rect(pixel.pixel)))
-                    || pixel.bounds.worst.outranks(t.rank)
-                    || !as_bounds.may_differ(&pixel.bounds, tests)
-                {
-                    continue;
-                }
-                self.pairs_tested += u64::from(pixel.end - pixel.first);
-                for row in pixel.first as usize..pixel.end as usize {
-                    if !too_far(best, distance_squared(t, pixel.pixel, nodes.offset(row))) {
-                        self.test(t, tile, pixel.pixel, row, best);
-                    }
-                }
-            }
-        }
-    }
-
-    /// Keeps a pair if it is valid and beats the best.
-    #[inline]
-    fn test(&self, t: &LineNode, tile: usize, pixel: [i32; 2], row: usize, best: &mut Option<Pair>) {
-        let Some(nodes) = &self.window.tiles[tile] else { return };
-        let rank = nodes.rank(row);
-        let own = !rank.outranks(t.rank);
-        let distance_squared = distance_squared(t, pixel, nodes.offset(row));
-        let (rank, radius_squared) =
-            if own { (t.rank, t.radius_squared) } else { (rank, nodes.bounds.radius_squared.get(row)) };
-        if distance_squared >= radius_squared {
+        if self.near_pixel.is_empty() {
             return;
         }
-        let pair = Pair { rank, distance_squared, pixel, tile, row, own };
-        if best.is_none_or(|best| pair.beats(&best)) && self.rules.tests().differ(&t.features, &nodes.features(row)) {
-            *best = Some(pair);
+        for row in pixel.first as usize..pixel.end as usize {
+            if lined[nodes.nodes.rows.sample(row) as usize] {
+                continue;
+            }
+            let node = nodes.node(pixel.pixel, row);
+            self.targets.push({
+                let style = nodes.style(row);
+                Target { row, node, style, opaque: style.is_opaque(self.rules), best: None }
+            });
         }
+        self.search_others(pixel.pixel, &bounded);
+        self.search_own(pixel.pixel, &bounded);
+    }
+
+    /// Finds for each target the highest-ranking valid pair whose neighbour outranks it.
+    fn search_others(&mut self, pixel: [i32; 2], bounded: &Bounded<'_>) {
+        let mut targets = std::mem::take(&mut self.targets);
+        for target in &mut targets {
+            if let Some(pair) = self.last_other {
+                self.test_again(target, &pair);
+            }
+            if let Some(pair) = self.last_own.filter(|_| self.any_pair) {
+                self.test_again(target, &pair);
+            }
+        }
+        let near = self.near_pixel.iter().map(|near| (near.tile, near.block.bounds.stylist));
+        let style = self.common_style(near);
+        let floor = self.floor(&targets, style);
+        if floor > Rank::FIRST {
+            self.collect_others(pixel, bounded, floor);
+            self.search_candidates(pixel, &mut targets, floor);
+        }
+        self.last_other =
+            targets.iter().rev().filter_map(|target| target.best).find(|best| !best.own).or(self.last_other);
+        self.targets = targets;
+    }
+
+    /// The style of all lines of some sets of nodes, if it is the same and nothing else of a pair matters.
+    fn common_style(&self, mut stylists: impl Iterator<Item = (u32, Stylist)>) -> Option<LineStyle> {
+        if !self.any_pair {
+            return None;
+        }
+        let mut common = None;
+        stylists
+            .all(|(tile, stylist)| match stylist {
+                Stylist::None => true,
+                Stylist::Many => false,
+                Stylist::Alike(row) => {
+                    let style = self.window.tiles[tile as usize].as_ref().map(|nodes| nodes.style(row as usize));
+                    style == *common.get_or_insert(style)
+                }
+            })
+            .then_some(common?)?
+    }
+
+    /// The lowest rank that can still change how a target looks, if all lines that can have this style; below all if
+    /// nothing can.
+    fn floor(&self, targets: &[Target], style: Option<LineStyle>) -> Rank {
+        let unsettled = targets.iter().filter(|target| !self.is_settled(target, style));
+        unsettled.fold(Rank::FIRST, |floor, target| floor.worse(target.best.map_or(target.node.rank, |best| best.rank)))
+    }
+
+    /// Whether no line of this style can change how a target looks.
+    fn is_settled(&self, target: &Target, style: Option<LineStyle>) -> bool {
+        let Some((style, best)) = style.zip(target.best) else { return false };
+        if best.own {
+            return target.style == style;
+        }
+        self.window.tiles[best.tile as usize].as_ref().is_some_and(|nodes| nodes.style(best.row as usize) == style)
+    }
+
+    /// Goes through the candidates, the highest-ranking first.
+    fn search_candidates(&mut self, pixel: [i32; 2], targets: &mut [Target], mut floor: Rank) {
+        let style = self.common_style(self.candidates.iter().map(|c| (c.tile, c.pixel.bounds.stylist)));
+        floor = floor.better(self.floor(targets, style));
+        let (mut next, mut batch) = (0, FIRST_BATCH);
+        while let Some(first) = self.candidates.get(next).map(|candidate| candidate.pixel.bounds.best) {
+            if floor.outranks(first) {
+                break;
+            }
+            self.lanes.clear();
+            self.lanes.certain = self.certain;
+            while let Some(candidate) = self.candidates.get(next).copied()
+                && self.lanes.len() < batch
+            {
+                self.gather(pixel, &candidate, |rank, radius_squared| radius_squared > 0.0 && !floor.outranks(rank));
+                next += 1;
+            }
+            batch *= 4;
+            self.lanes.finish();
+            for target in targets.iter_mut() {
+                if target.may_win(first) && !self.is_settled(target, style) {
+                    self.pairs_tested += self.lanes.len() as u64;
+                    let score = self.lanes.score_others(&target.node, self.tests);
+                    for origin in self.lanes.with_score(score) {
+                        keep(self.window, self.tests, target, origin);
+                    }
+                }
+            }
+            floor = self.floor(targets, style);
+        }
+    }
+
+    /// Gathers the rows of a candidate for targets in `pixel`.
+    fn gather(&mut self, pixel: [i32; 2], candidate: &Candidate<'w>, wanted: impl Fn(Rank, f32) -> bool) {
+        let Candidate { tile, pixel: neighbors, .. } = *candidate;
+        let Some(nodes) = &self.window.tiles[tile as usize] else { return };
+        for row in neighbors.first..neighbors.end {
+            let rank = nodes.rank(row as usize);
+            if wanted(rank, nodes.bounds.radius_squared.get(row as usize)) {
+                self.lanes.push(Origin { tile, pixel: neighbors.pixel, row }, pixel, rank, nodes, self.tests);
+            }
+        }
+    }
+
+    /// Collects pixels that may hold a neighbour whose line a target sees, by best rank. None lies below `floor`, the
+    /// lowest rank that can still win.
+    fn collect_others(&mut self, pixel: [i32; 2], targets: &Bounded<'_>, mut floor: Rank) {
+        self.candidates.clear();
+        self.near_pixel.sort_unstable_by_key(|near| near.block.bounds.best);
+        for near in &self.near_pixel {
+            let Near { tile, bounds, block, gap_squared } = *near;
+            if floor.outranks(block.bounds.best) {
+                break;
+            }
+            if gap_squared >= block.bounds.radius_squared {
+                continue;
+            }
+            for &index in &bounds.by_rank[block.first as usize..block.end as usize] {
+                let place = block.first + u32::from(index);
+                let neighbors = &bounds.pixels[place as usize];
+                if floor.outranks(neighbors.bounds.best) {
+                    break;
+                }
+                let gap_squared = pixel_gap_squared(pixel, neighbors.pixel);
+                if gap_squared >= neighbors.bounds.radius_squared {
+                    continue;
+                }
+                let bounded = bounds.of_pixel(place as usize);
+                if !targets.may_differ(&bounded, self.tests) {
+                    continue;
+                }
+                let certain = targets.must_differ(&bounded, self.tests);
+                self.candidates.push(Candidate { tile, pixel: neighbors, gap_squared, certain });
+                if certain
+                    && neighbors.bounds.best.outranks(targets.bounds.highest)
+                    && far_squared(pixel, neighbors.pixel) < neighbors.bounds.thinnest_squared
+                {
+                    floor = floor.better(neighbors.bounds.best);
+                }
+            }
+        }
+        self.candidates.retain(|candidate| !floor.outranks(candidate.pixel.bounds.best));
+        self.certain = self.candidates.iter().all(|candidate| candidate.certain);
+        self.candidates.sort_unstable_by(|a, b| {
+            let by_rank = a.pixel.bounds.best.cmp(&b.pixel.bounds.best);
+            by_rank.then(a.gap_squared.total_cmp(&b.gap_squared))
+        });
+    }
+
+    /// Finds for each target that sees no other line the nearest neighbour that differs and does not outrank it.
+    fn search_own(&mut self, pixel: [i32; 2], bounded: &Bounded<'_>) {
+        let mut targets = std::mem::take(&mut self.targets);
+        let mut own = OwnTargets { highest: Rank::LAST, lowest: Rank::FIRST, thinnest: f32::INFINITY, limit: 0.0 };
+        let any_pair = self.any_pair;
+        // An own line looks the same whichever its neighbour is.
+        let open = |target: &&mut Target| target.wants_own() && !(any_pair && target.opaque && target.best.is_some());
+        for target in targets.iter_mut().filter(open) {
+            if let Some(pair) = self.last_own {
+                self.test_again(target, &pair);
+            }
+            if !open(&target) {
+                continue;
+            }
+            // The last own line may be another's here.
+            let radius_squared = target.node.radius_squared;
+            let limit = target.best.map_or(radius_squared, |best| best.distance_squared);
+            own.limit = own.limit.max(limit);
+            own.thinnest = own.thinnest.min(radius_squared);
+            own.highest = own.highest.better(target.node.rank);
+            own.lowest = own.lowest.worse(target.node.rank);
+        }
+        if own.limit > 0.0 || own.thinnest < f32::INFINITY {
+            self.collect_own(pixel, bounded, own);
+            let (mut next, mut batch) = (0, FIRST_BATCH);
+            while let Some(first) = self.candidates.get(next).map(|candidate| candidate.gap_squared) {
+                if first > own.limit {
+                    break;
+                }
+                self.lanes.clear();
+                self.lanes.certain = self.certain;
+                while let Some(candidate) = self.candidates.get(next).copied()
+                    && self.lanes.len() < batch
+                {
+                    self.gather(pixel, &candidate, |rank, _| !rank.outranks(own.highest));
+                    next += 1;
+                }
+                batch *= 4;
+                self.lanes.finish();
+                own.limit = 0.0;
+                for target in targets.iter_mut().filter(open) {
+                    if !target.too_far(first) {
+                        self.pairs_tested += self.lanes.len() as u64;
+                        let score = self.lanes.score_own(&target.node, self.tests);
+                        for origin in self.lanes.with_score(score) {
+                            keep(self.window, self.tests, target, origin);
+                        }
+                    }
+                    if open(&target) {
+                        let limit = target.best.map_or(target.node.radius_squared, |best| best.distance_squared);
+                        own.limit = own.limit.max(limit);
+                    }
+                }
+            }
+            self.last_own =
+                targets.iter().rev().filter_map(|target| target.best).find(|best| best.own).or(self.last_own);
+        }
+        self.targets = targets;
+    }
+
+    /// Collects pixels that may hold the nearest neighbour of an own line, the nearest first.
+    fn collect_own(&mut self, pixel: [i32; 2], targets: &Bounded<'_>, mut own: OwnTargets) {
+        self.candidates.clear();
+        self.near_pixel.sort_unstable_by(|a, b| a.gap_squared.total_cmp(&b.gap_squared));
+        for near in &self.near_pixel {
+            let Near { tile, bounds, block, gap_squared } = *near;
+            if gap_squared > own.limit {
+                break;
+            }
+            if block.bounds.lowest.outranks(own.highest) {
+                continue;
+            }
+            for place in block.first..block.end {
+                let neighbors = &bounds.pixels[place as usize];
+                let gap_squared = pixel_gap_squared(pixel, neighbors.pixel);
+                if gap_squared > own.limit || neighbors.bounds.lowest.outranks(own.highest) {
+                    continue;
+                }
+                let bounded = bounds.of_pixel(place as usize);
+                if !targets.may_differ(&bounded, self.tests) {
+                    continue;
+                }
+                let certain = targets.must_differ(&bounded, self.tests);
+                self.candidates.push(Candidate { tile, pixel: neighbors, gap_squared, certain });
+                let far_squared = far_squared(pixel, neighbors.pixel);
+                if certain && far_squared < own.limit.min(own.thinnest) && !neighbors.bounds.lowest.outranks(own.lowest)
+                {
+                    own.limit = far_squared;
+                }
+            }
+        }
+        self.candidates.retain(|candidate| candidate.gap_squared <= own.limit);
+        self.certain = self.candidates.iter().all(|candidate| candidate.certain);
+        self.candidates.sort_unstable_by(|a, b| a.gap_squared.total_cmp(&b.gap_squared));
+    }
+
+    /// What a target of the last pixel sees through the line of a pair, front to back. Plain: few lines are not opaque.
+    fn search_behind(&mut self, nodes: &PathTile<'_>, place: usize, target: usize, first: Pair) -> Vec<Pair> {
+        let mut behind = Vec::new();
+        let bounded = nodes.bounds.of_pixel(place);
+        let mut taken = Taken::default();
+        let mut last = first;
+        while behind.len() + 1 < MOST_LINES {
+            let target = &mut self.targets[target];
+            let Some(neighbors) = &self.window.tiles[last.tile as usize] else { break };
+            let alpha = if last.own {
+                nodes.alpha(target.row, self.rules)
+            } else {
+                neighbors.alpha(last.row as usize, self.rules)
+            };
+            if alpha >= 1.0 {
+                break;
+            }
+            taken.take(&neighbors.features(last.row as usize), last.own);
+            target.best = None;
+            for near in &self.near_pixel {
+                let Some(tile) = &self.window.tiles[near.tile as usize] else { continue };
+                for place in near.block.first as usize..near.block.end as usize {
+                    let pixel = &near.bounds.pixels[place];
+                    let gap_squared = pixel_gap_squared(target.node.pixel, pixel.pixel);
+                    if !may_matter(&bounded, &near.bounds.of_pixel(place), gap_squared, self.tests)
+                        || target.best.is_some_and(|best| {
+                            best.rank.outranks(pixel.bounds.best) && (!best.own || gap_squared > best.distance_squared)
+                        })
+                    {
+                        continue;
+                    }
+                    self.pairs_tested += u64::from(pixel.end - pixel.first);
+                    for row in pixel.first..pixel.end {
+                        let own = !tile.rank(row as usize).outranks(target.node.rank);
+                        if !taken.contains(&tile.features(row as usize), own) {
+                            let origin = Origin { tile: near.tile, pixel: pixel.pixel, row };
+                            keep(self.window, self.tests, target, &origin);
+                        }
+                    }
+                }
+            }
+            let Some(pair) = target.best else { break };
+            behind.push(pair);
+            last = pair;
+        }
+        behind
+    }
+
+    /// Tests a target with the neighbour of another target's pair.
+    fn test_again(&mut self, target: &mut Target, pair: &Pair) {
+        self.pairs_tested += 1;
+        let origin = Origin { tile: pair.tile, pixel: pair.pixel, row: pair.row };
+        keep(self.window, self.tests, target, &origin);
     }
 }
 
-/// Whether a neighbour of this rank may outrank the target and all that was found so far.
-#[inline]
-fn may_win(t: &LineNode, best: &Option<Pair>, rank: Rank) -> bool {
-    rank.outranks(t.rank) && best.is_none_or(|best| !best.rank.outranks(rank))
+/// Keeps a pair if it is valid and beats the best.
+fn keep(window: &PathWindow<'_>, tests: &Tests, target: &mut Target, origin: &Origin) {
+    let Origin { tile, pixel, row } = *origin;
+    let Some(nodes) = &window.tiles[tile as usize] else { return };
+    let t = &target.node;
+    let rank = nodes.rank(row as usize);
+    let own = !rank.outranks(t.rank);
+    let distance_squared = distance_squared(t, pixel, nodes.offset(row as usize));
+    let (rank, radius_squared) =
+        if own { (t.rank, t.radius_squared) } else { (rank, nodes.bounds.radius_squared.get(row as usize)) };
+    if distance_squared >= radius_squared {
+        return;
+    }
+    let pair = Pair { rank, distance_squared, pixel, tile, row, own };
+    if target.best.is_none_or(|best| pair.beats(&best)) && tests.differ(&t.features, &nodes.features(row as usize)) {
+        target.best = Some(pair);
+    }
 }
 
-/// Whether neighbours of at most this rank and at least this distance can only tie in rank and are too far then.
+/// What is known of the targets of a pixel that look for own lines.
+#[derive(Clone, Copy)]
+struct OwnTargets {
+    highest: Rank,
+    lowest: Rank,
+    /// The smallest squared radius.
+    thinnest: f32,
+    /// The squared distance within which each is sure to find its line, if it has one.
+    limit: f32,
+}
+
+/// Whether targets and neighbours at least this far apart may make lines.
 #[inline]
-fn loses_by_distance(best: &Option<Pair>, rank: Rank, distance_squared: f32) -> bool {
-    best.is_some_and(|best| best.rank == rank && distance_squared > best.distance_squared)
+fn may_matter(targets: &Bounded<'_>, neighbors: &Bounded<'_>, gap_squared: f32, tests: &Tests) -> bool {
+    let near = gap_squared < targets.bounds.radius_squared.max(neighbors.bounds.radius_squared);
+    near && targets.may_differ(neighbors, tests)
 }
 
 /// The smallest squared distance that [`distance_squared`] can give between a target in one rectangle and a neighbour in
@@ -308,17 +564,19 @@ fn rect_gap_squared(targets: &PixelRect, neighbors: &PixelRect) -> f32 {
     x * x + y * y
 }
 
-/// The smallest squared distance that [`distance_squared`] can give from a target to a neighbour in a rectangle. Its
-/// operations are the same, at the nearest offset there is; they are monotone, so no rounding makes this too large.
-#[inline]
-fn target_gap_squared(t: &LineNode, rect: &PixelRect) -> f32 {
-    let gap = |pixel: i32, offset: f32, first: i32, end: i32| {
-        let before = (first - pixel) as f32 + (0.0 - offset);
-        let behind = (end - 1 - pixel) as f32 + (1.0 - offset);
-        before.max(-behind).max(0.0)
-    };
-    let x = gap(t.pixel[0], t.offset[0], rect.x0, rect.x1);
-    let y = gap(t.pixel[1], t.offset[1], rect.y0, rect.y1);
+/// [`rect_gap_squared`] between two pixels.
+#[inline(always)]
+fn pixel_gap_squared(targets: [i32; 2], neighbors: [i32; 2]) -> f32 {
+    let gap = |axis: usize| ((neighbors[axis] - targets[axis]).abs() - 1).max(0) as f32;
+    let (x, y) = (gap(0), gap(1));
+    x * x + y * y
+}
+
+/// The largest squared distance between a target in one pixel and a neighbour in another.
+#[inline(always)]
+fn far_squared(targets: [i32; 2], neighbors: [i32; 2]) -> f32 {
+    let far = |axis: usize| ((neighbors[axis] - targets[axis]).abs() + 1) as f32;
+    let (x, y) = (far(0), far(1));
     x * x + y * y
 }
 

@@ -24,36 +24,50 @@ impl LineType {
     }
 }
 
-/// The line that a target sees, in its colours.
+/// The line that a target sees, in its colours. Lines that are seen through it are mixed into it, from the back to the
+/// front; what else is told of the line is of the one in front.
 pub(super) fn style(window: &PathWindow<'_>, targets: &PathTile<'_>, found: &Found, rules: &Rules) -> Option<SeenLine> {
-    let pair = &found.pair;
-    let neighbors = window.tiles[pair.tile].as_ref()?;
-    let (styling, row) = if pair.own { (targets.nodes, found.row) } else { (neighbors.nodes, pair.row) };
-    let line_color = Vec3::from(styling.line_color.get(row));
-    let alpha = rules.alpha(styling.line_width.get(row));
-
-    let sample = targets.nodes.sample[found.row];
-    let before = Vec3::from(targets.buffer.color[sample as usize].color);
+    let sample = targets.nodes.rows.sample(found.row);
+    let before = Vec3::from(targets.buffer.color[sample as usize]);
     // The target's: it is the target's colour that the line replaces.
     let throughput = Vec3::from(targets.nodes.throughput.get(found.row));
+    let mut contribution = Vec3::from(targets.nodes.contribution.get(found.row));
     let settings = rules.settings();
-    let color = if settings.tint { line_color * throughput } else { line_color };
-    let lined = match settings.compose {
-        Composition::Replace => before * (1.0 - alpha) + color * alpha,
-        Composition::Throughput => {
-            let part = if settings.tint { color } else { line_color * luminance(throughput) };
-            before + (part - Vec3::from(targets.nodes.contribution.get(found.row))) * alpha
+    let (mut lined, mut color, mut premultiplied, mut covered) = (before, Vec3::ZERO, Vec3::ZERO, 0.0);
+    for pair in found.behind.iter().rev().chain([&found.pair]) {
+        let (nodes, row) = match pair.own {
+            true => (targets, found.row),
+            false => (window.tiles[pair.tile as usize].as_ref()?, pair.row as usize),
+        };
+        let line_color = Vec3::from(nodes.nodes.line_color.get(row));
+        let alpha = nodes.alpha(row, rules);
+        color = if settings.tint { line_color * throughput } else { line_color };
+        match settings.compose {
+            Composition::Replace => lined = lined * (1.0 - alpha) + color * alpha,
+            Composition::Throughput => {
+                let part = if settings.tint { color } else { line_color * luminance(throughput) };
+                let change = (part - contribution) * alpha;
+                lined += change;
+                contribution += change;
+            }
         }
-    };
+        premultiplied = premultiplied * (1.0 - alpha) + color * alpha;
+        covered = covered * (1.0 - alpha) + alpha;
+    }
+    if !found.behind.is_empty() && covered > 0.0 {
+        color = premultiplied / covered;
+    }
 
+    let pair = &found.pair;
+    let neighbors = window.tiles[pair.tile as usize].as_ref()?;
     let spp = neighbors.buffer.samples_per_pixel;
     Some(SeenLine {
         color: color.to_array(),
-        alpha,
+        alpha: covered,
         lined: lined.to_array(),
         path: found.path,
-        fired: rules.tests().fired(&features(targets.nodes, found.row), &features(neighbors.nodes, pair.row)),
-        neighbor: (pair.pixel, neighbors.nodes.sample[pair.row] % spp),
+        fired: rules.tests().fired(&features(targets.nodes, found.row), &features(neighbors.nodes, pair.row as usize)),
+        neighbor: (pair.pixel, neighbors.nodes.rows.sample(pair.row as usize) % spp),
         own: pair.own,
     })
 }

@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use super::Rules;
 use super::bounds::{PathBounds, TileBounds};
 use super::differ::Features;
 use super::pair::{LineNode, Rank};
@@ -133,17 +134,51 @@ impl<'a> PathTile<'a> {
     /// Place of a row's sample in its pixel.
     #[inline(always)]
     pub(super) fn offset(&self, row: usize) -> [f32; 2] {
-        self.buffer.offset[self.nodes.sample[row] as usize]
+        self.buffer.offset[self.nodes.rows.sample(row) as usize]
     }
 
     #[inline(always)]
     pub(super) fn rank(&self, row: usize) -> Rank {
-        Rank { priority: self.nodes.priority.get(row), depth: self.nodes.depth.get(row) }
+        Rank::new(self.nodes.priority.get(row), self.nodes.depth.get(row))
+    }
+
+    /// How much the line of a row covers, 0 … 1.
+    pub(super) fn alpha(&self, row: usize, rules: &Rules) -> f32 {
+        rules.alpha(self.nodes.line_width.get(row)) * self.nodes.line_opacity.get(row)
+    }
+
+    #[inline(always)]
+    pub(super) fn style(&self, row: usize) -> LineStyle {
+        style(self.nodes, row)
     }
 
     #[inline(always)]
     pub(super) fn features(&self, row: usize) -> Features {
         features(self.nodes, row)
+    }
+}
+
+/// What of a node a line shows: colour, width and opacity.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct LineStyle {
+    color: [f32; 3],
+    width: f32,
+    opacity: f32,
+}
+
+impl LineStyle {
+    pub(super) fn is_opaque(&self, rules: &Rules) -> bool {
+        rules.alpha(self.width) * self.opacity >= 1.0
+    }
+}
+
+/// The style of a row.
+#[inline(always)]
+pub(super) fn style(nodes: &NodeColumns, row: usize) -> LineStyle {
+    LineStyle {
+        color: nodes.line_color.get(row),
+        width: nodes.line_width.get(row),
+        opacity: nodes.line_opacity.get(row),
     }
 }
 

@@ -2,7 +2,8 @@
 //!
 //! Invariants, kept by the [builder](super::builder): all numbers have passed the [gate](super::gate); rows of a path
 //! are sorted by sample and each sample has at most one; the camera's path comes first and has one row per sample, so
-//! there row and sample are the same number; a column whose values are all equal is [`Column::Constant`].
+//! there row and sample are the same number ([`Rows::Every`]); a column whose values are all equal is
+//! [`Column::Constant`], one of few values mostly [`Column::Palette`].
 
 use std::ops::Range;
 
@@ -68,12 +69,20 @@ impl PixelRect {
     }
 }
 
-/// A column of values, or one value for all rows. A column that the plan does not name is constant at its neutral
-/// value and takes no memory.
+/// A column of values, in the shortest form that holds them exactly. A column that the plan does not name is constant at
+/// its neutral value and takes no memory.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Column<T> {
     /// Every row has this value.
     Constant(T),
+    /// Few values, in the order in which they first occur, and for each row its place among them: a byte instead of an
+    /// id, a colour or a width.
+    Palette {
+        /// The values, at most 256.
+        values: Vec<T>,
+        /// For each row.
+        places: Vec<u8>,
+    },
     /// One value per row.
     Values(Vec<T>),
 }
@@ -85,6 +94,7 @@ impl<T: Copy> Column<T> {
     pub fn get(&self, row: usize) -> T {
         match self {
             Self::Constant(value) => *value,
+            Self::Palette { values, places } => values[usize::from(places[row])],
             Self::Values(values) => values[row],
         }
     }
@@ -94,7 +104,86 @@ impl<T: Copy> Column<T> {
     pub fn bytes(&self) -> usize {
         match self {
             Self::Constant(_) => 0,
+            Self::Palette { values, places } => values.len() * size_of::<T>() + places.len(),
             Self::Values(values) => values.len() * size_of::<T>(),
+        }
+    }
+
+    /// The column of a function of the values.
+    #[must_use]
+    pub fn map<U: Copy>(&self, mut function: impl FnMut(T) -> U) -> Column<U> {
+        match self {
+            Self::Constant(value) => Column::Constant(function(*value)),
+            Self::Palette { values, places } => Column::Palette {
+                values: values.iter().map(|value| function(*value)).collect(),
+                places: places.clone(),
+            },
+            Self::Values(values) => Column::Values(values.iter().map(|value| function(*value)).collect()),
+        }
+    }
+}
+
+/// Which samples have a node at a path.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Rows {
+    /// Every one of this many: row and sample are the same number.
+    Every {
+        /// Number of samples.
+        samples: u32,
+        /// How many lie in a pixel.
+        per_pixel: u32,
+    },
+    /// Some.
+    Some {
+        /// For each pixel of the rectangle (row by row) and one past the last: its first row.
+        first: Vec<u32>,
+        /// The sample of each row (index into the buffer), rising.
+        sample: Vec<u32>,
+    },
+}
+
+impl Rows {
+    /// Number of rows.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        match self {
+            Self::Every { samples, .. } => *samples as usize,
+            Self::Some { sample, .. } => sample.len(),
+        }
+    }
+
+    /// Whether there are none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The sample of a row.
+    #[inline(always)]
+    #[must_use]
+    pub fn sample(&self, row: usize) -> u32 {
+        match self {
+            Self::Every { .. } => row as u32,
+            Self::Some { sample, .. } => sample[row],
+        }
+    }
+
+    /// The rows of a pixel, by its number in the rectangle (row by row).
+    #[inline]
+    #[must_use]
+    pub fn of_pixel(&self, pixel: usize) -> Range<usize> {
+        match self {
+            Self::Every { per_pixel, .. } => pixel * *per_pixel as usize..(pixel + 1) * *per_pixel as usize,
+            Self::Some { first, .. } => first[pixel] as usize..first[pixel + 1] as usize,
+        }
+    }
+
+    /// Bytes of heap memory.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        match self {
+            Self::Every { .. } => 0,
+            Self::Some { first, sample } => (first.len() + sample.len()) * size_of::<u32>(),
         }
     }
 }
@@ -127,6 +216,8 @@ pub struct Node {
     pub line_color: [f32; 3],
     /// Full line width in pixels; ≤ 0 is no line.
     pub line_width: f32,
+    /// Opacity of the line, 0 … 1.
+    pub line_opacity: f32,
     /// Line priority.
     pub priority: i32,
     /// Product of the weights along the path from the camera, 1 at the camera.
@@ -147,6 +238,7 @@ impl Default for Node {
             depth: f32::INFINITY,
             line_color: [0.0; 3],
             line_width: 0.0,
+            line_opacity: 1.0,
             // A miss never decides a line's style, whatever the objects' priorities.
             priority: i32::MIN,
             throughput: [1.0; 3],
@@ -166,7 +258,7 @@ pub struct NodeColumnSet {
     pub feature: bool,
     /// Lines or the depth layer are on.
     pub depth: bool,
-    /// Lines are on: line colour, line width, priority.
+    /// Lines are on: line colour, line width, line opacity, priority.
     pub lines: bool,
     /// Tint or throughput composition is on and there are secondary paths.
     pub throughput: bool,
@@ -185,10 +277,8 @@ impl NodeColumnSet {
 pub struct NodeColumns {
     /// The path.
     pub path: NodePath,
-    /// For each pixel of the rectangle (row by row) and one past the last: its first row.
-    pub first: Vec<u32>,
-    /// The sample of each row (index into the buffer). Rows are sorted by it.
-    pub sample: Vec<u32>,
+    /// The sample of each row.
+    pub rows: Rows,
     /// 1 + object id; 0 is a miss.
     pub object: Column<u32>,
     /// 1 + material id; 0 is a miss.
@@ -205,6 +295,8 @@ pub struct NodeColumns {
     pub line_color: Column<[f32; 3]>,
     /// Line widths in pixels.
     pub line_width: Column<f32>,
+    /// Opacities of the lines.
+    pub line_opacity: Column<f32>,
     /// Line priorities.
     pub priority: Column<i32>,
     /// Path throughputs.
@@ -223,7 +315,9 @@ pub struct SampleBuffer {
     /// Offsets inside the pixel, 0 … 1.
     pub offset: Vec<[f32; 2]>,
     /// Colours without lines.
-    pub color: Vec<SampleColor>,
+    pub color: Vec<[f32; 3]>,
+    /// 1, or 0 where the camera sees a transparent background.
+    pub alpha: Column<f32>,
     /// World positions at the camera's nodes, if the plan names them.
     pub position: Column<[f32; 3]>,
     /// Extra outputs at the camera's nodes, in the plan's order of names.
@@ -235,25 +329,10 @@ pub struct SampleBuffer {
 }
 
 impl NodeColumns {
-    /// The rows of a pixel, by its number in the rectangle (row by row).
-    #[inline]
-    #[must_use]
-    pub fn rows(&self, pixel: usize) -> Range<usize> {
-        self.first[pixel] as usize..self.first[pixel + 1] as usize
-    }
-
-    /// The row of a sample, if it has a node at this path.
-    #[must_use]
-    pub fn row_of(&self, sample: u32, samples_per_pixel: u32) -> Option<usize> {
-        let rows = self.rows((sample / samples_per_pixel) as usize);
-        let found = self.sample[rows.clone()].binary_search(&sample).ok()?;
-        Some(rows.start + found)
-    }
-
     /// Bytes of heap memory.
     #[must_use]
     pub fn bytes(&self) -> usize {
-        (self.first.len() + self.sample.len()) * size_of::<u32>()
+        self.rows.bytes()
             + self.object.bytes()
             + self.shader.bytes()
             + self.uv.bytes()
@@ -262,6 +341,7 @@ impl NodeColumns {
             + self.depth.bytes()
             + self.line_color.bytes()
             + self.line_width.bytes()
+            + self.line_opacity.bytes()
             + self.priority.bytes()
             + self.throughput.bytes()
             + self.contribution.bytes()
@@ -299,7 +379,8 @@ impl SampleBuffer {
     #[must_use]
     pub fn bytes(&self) -> usize {
         self.offset.len() * size_of::<[f32; 2]>()
-            + self.color.len() * size_of::<SampleColor>()
+            + self.color.len() * size_of::<[f32; 3]>()
+            + self.alpha.bytes()
             + self.position.bytes()
             + self.aovs.iter().map(Column::bytes).sum::<usize>()
             + self.paths.iter().map(NodeColumns::bytes).sum::<usize>()

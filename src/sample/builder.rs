@@ -1,10 +1,10 @@
 //! How a [`SampleBuffer`] is filled: node by node, through the [gate](super::gate).
 //!
 //! The tracer works in waves, so nodes of one path mostly arrive in the order of their samples; then closing the buffer
-//! copies nothing. A column starts as [`Column::Constant`] and becomes one value per row at the first value that
-//! differs, so uniform columns never cost memory.
+//! copies nothing. A column starts as [`Column::Constant`], becomes a [`Column::Palette`] at the first value that differs and
+//! one value per row when there are too many, so uniform columns never cost memory.
 
-use super::buffer::{Column, Node, NodeColumnSet, NodeColumns, PixelRect, SampleBuffer, SampleColor};
+use super::buffer::{Column, Node, NodeColumnSet, NodeColumns, PixelRect, Rows, SampleBuffer, SampleColor};
 use super::gate::{Faults, GateLog, clean_node};
 use super::path::NodePath;
 
@@ -42,7 +42,8 @@ pub struct SampleBufferBuilder {
     layout: SampleLayout,
     rect: PixelRect,
     offset: Vec<[f32; 2]>,
-    color: Vec<SampleColor>,
+    color: Vec<[f32; 3]>,
+    alpha: Vec<f32>,
     position: Column<[f32; 3]>,
     aovs: Vec<Column<[f32; 3]>>,
     paths: Vec<PathRows>,
@@ -62,7 +63,8 @@ impl SampleBufferBuilder {
         Self {
             rect,
             offset: vec![[0.0; 2]; samples],
-            color: vec![SampleColor::default(); samples],
+            color: vec![[0.0; 3]; samples],
+            alpha: vec![0.0; samples],
             position: kept(layout.position),
             aovs: vec![kept(true); layout.aovs],
             paths: vec![PathRows::new(NodePath::CAMERA, samples)],
@@ -81,11 +83,12 @@ impl SampleBufferBuilder {
     pub fn set_sample(&mut self, sample: u32, offset: [f32; 2], color: SampleColor, shader: u32) {
         let mut faults = Faults::default();
         let [alpha] = faults.numbers([color.alpha]);
-        let clean = SampleColor { color: faults.numbers(color.color), alpha };
+        let clean = faults.numbers(color.color);
         self.gate.note(NodePath::CAMERA, sample, shader, faults);
         // The bounds of the line search rely on the range.
         self.offset[sample as usize] = Faults::default().numbers(offset).map(|x| x.clamp(0.0, 1.0));
         self.color[sample as usize] = clean;
+        self.alpha[sample as usize] = alpha;
     }
 
     /// Sets what only the camera's node of a sample keeps: position and extra outputs (as many as the layout says).
@@ -134,6 +137,7 @@ impl SampleBufferBuilder {
             samples_per_pixel: self.layout.samples_per_pixel,
             offset: self.offset,
             color: self.color,
+            alpha: Column::Values(self.alpha).collapsed(),
             position: self.position.collapsed(),
             aovs: self.aovs.into_iter().map(Column::collapsed).collect(),
             paths,
@@ -173,6 +177,7 @@ struct PathRows {
     depth: Column<f32>,
     line_color: Column<[f32; 3]>,
     line_width: Column<f32>,
+    line_opacity: Column<f32>,
     priority: Column<i32>,
     throughput: Column<[f32; 3]>,
     contribution: Column<[f32; 3]>,
@@ -194,6 +199,7 @@ impl PathRows {
             depth: Column::Constant(neutral.depth),
             line_color: Column::Constant(neutral.line_color),
             line_width: Column::Constant(neutral.line_width),
+            line_opacity: Column::Constant(neutral.line_opacity),
             priority: Column::Constant(neutral.priority),
             throughput: Column::Constant(neutral.throughput),
             contribution: Column::Constant(neutral.contribution),
@@ -221,6 +227,7 @@ impl PathRows {
         if kept.lines {
             self.line_color.push(row, node.line_color, expected);
             self.line_width.push(row, node.line_width, expected);
+            self.line_opacity.push(row, node.line_opacity, expected);
             self.priority.push(row, node.priority, expected);
         }
         if kept.throughput {
@@ -243,17 +250,22 @@ impl PathRows {
             Some(order) => order.iter().map(|&row| self.sample[row as usize]).collect(),
             None => self.sample,
         };
-        let mut first = vec![0; rect.pixels() + 1];
-        for &sample in &sample {
-            first[(sample / samples_per_pixel) as usize + 1] += 1;
-        }
-        for pixel in 1..first.len() {
-            first[pixel] += first[pixel - 1];
-        }
+        let all = rect.pixels() * samples_per_pixel as usize;
+        let rows = if sample.len() == all {
+            Rows::Every { samples: all as u32, per_pixel: samples_per_pixel }
+        } else {
+            let mut first = vec![0; rect.pixels() + 1];
+            for &sample in &sample {
+                first[(sample / samples_per_pixel) as usize + 1] += 1;
+            }
+            for pixel in 1..first.len() {
+                first[pixel] += first[pixel - 1];
+            }
+            Rows::Some { first, sample }
+        };
         NodeColumns {
             path: self.path,
-            first,
-            sample,
+            rows,
             object: self.object.ordered(order),
             shader: self.shader.ordered(order),
             uv: self.uv.ordered(order),
@@ -262,6 +274,7 @@ impl PathRows {
             depth: self.depth.ordered(order),
             line_color: self.line_color.ordered(order),
             line_width: self.line_width.ordered(order),
+            line_opacity: self.line_opacity.ordered(order),
             priority: self.priority.ordered(order),
             throughput: self.throughput.ordered(order),
             contribution: self.contribution.ordered(order),
@@ -272,32 +285,70 @@ impl PathRows {
 impl<T: Copy + PartialEq> Column<T> {
     /// Appends the value of row number `row`. Behind the gate `==` means equal bits, so nothing is lost when equal
     /// values share one.
+    #[inline]
     fn push(&mut self, row: usize, value: T, expected: usize) {
         match self {
             Self::Values(values) => values.push(value),
+            Self::Palette { values, places } => {
+                let last = places[row - 1];
+                if values[usize::from(last)] == value {
+                    places.push(last);
+                } else {
+                    self.push_other(row, value, expected);
+                }
+            }
             Self::Constant(constant) if row == 0 => *constant = value,
             Self::Constant(constant) if *constant == value => {}
             Self::Constant(constant) => {
-                let mut values = Vec::with_capacity(expected.max(row + 1));
-                values.resize(row, *constant);
-                values.push(value);
-                *self = Self::Values(values);
+                let mut places = Vec::with_capacity(expected.max(row + 1));
+                places.resize(row, 0);
+                places.push(1);
+                *self = Self::Palette { values: vec![*constant, value], places };
             }
         }
     }
 
+    /// Appends a value that is not that of the row before to a palette.
+    fn push_other(&mut self, row: usize, value: T, expected: usize) {
+        let Self::Palette { values, places } = self else { return };
+        if let Some(place) = values.iter().position(|known| *known == value) {
+            places.push(place as u8);
+            return;
+        }
+        // Values that come faster than this will be too many; it is sooner said than tried.
+        if values.len() < (16 + row / 32).min(256) {
+            places.push(values.len() as u8);
+            values.push(value);
+            return;
+        }
+        let mut all = Vec::with_capacity(expected.max(row + 1));
+        all.extend(places.iter().map(|&place| values[usize::from(place)]));
+        all.push(value);
+        *self = Self::Values(all);
+    }
+
     /// The values in another order, in no more memory than they need.
     fn ordered(self, order: Option<&[u32]>) -> Self {
-        match (self, order) {
-            (Self::Values(values), Some(order)) => {
-                Self::Values(order.iter().map(|&row| values[row as usize]).collect()).collapsed()
-            }
-            (Self::Values(mut values), None) => {
-                values.shrink_to_fit();
-                Self::Values(values)
-            }
-            (constant, _) => constant,
+        if order.is_none() {
+            return match self {
+                Self::Values(mut values) => {
+                    values.shrink_to_fit();
+                    Self::Values(values)
+                }
+                Self::Palette { values, mut places } => {
+                    places.shrink_to_fit();
+                    Self::Palette { values, places }
+                }
+                constant => constant,
+            };
         }
+        // Pushed once more, so that equal columns have equal forms whatever the order they came in.
+        let order = order.unwrap_or_default();
+        let mut ordered = Self::Constant(self.get(order.first().map_or(0, |&row| row as usize)));
+        for (row, &from) in order.iter().enumerate() {
+            ordered.push(row, self.get(from as usize), order.len());
+        }
+        ordered.ordered(None)
     }
 
     /// [`Self::Constant`] if all values are equal.
@@ -307,7 +358,7 @@ impl<T: Copy + PartialEq> Column<T> {
                 Some((first, rest)) if rest.iter().all(|value| value == first) => Self::Constant(*first),
                 _ => self,
             },
-            Self::Constant(_) => self,
+            Self::Palette { .. } | Self::Constant(_) => self,
         }
     }
 }

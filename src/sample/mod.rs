@@ -14,7 +14,7 @@ pub mod gate;
 pub mod path;
 pub mod position;
 
-pub use buffer::{Column, Node, NodeColumnSet, NodeColumns, PixelRect, SampleBuffer, SampleColor};
+pub use buffer::{Column, Node, NodeColumnSet, NodeColumns, PixelRect, Rows, SampleBuffer, SampleColor};
 pub use builder::{HandMadeSample, SampleBufferBuilder, SampleLayout};
 pub use gate::GateCounts;
 pub use path::NodePath;

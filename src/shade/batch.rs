@@ -135,6 +135,7 @@ pub struct OutputBatch {
     pub feature: Vec<Vec3>,
     pub line_color: Vec<Option<Vec3>>,
     pub line_width: Vec<Option<f32>>,
+    pub line_opacity: Vec<f32>,
     pub priority: Vec<Option<i32>>,
     pub color: Vec<Option<Vec3>>,
     /// The plan's `aov_` names in order; a key that is left out is 0.

@@ -175,11 +175,14 @@ fn import(statement: &Stmt) -> Result<Option<Import>, (Fault, Position)> {
     Ok(Some(Import { path: path.to_string(), alias: alias.name.to_string(), path_position: *path_position }))
 }
 
-/// The imports at the head of a script, for those who look up its files; none if it cannot be parsed.
-pub(super) fn imports(source: &Arc<Source>) -> Vec<Import> {
-    let parsed = glance(source);
-    let statements = parsed.iter().flat_map(AST::statements);
-    statements.filter_map(|statement| import(statement).ok().flatten()).collect()
+/// The imports at the head of a script and the images that it names, for those who look up its files; none if it cannot
+/// be parsed.
+pub(super) fn named_files(source: &Arc<Source>) -> (Vec<Import>, Vec<NamedTexture>) {
+    // Most scripts name no files, and parsing a long one takes time.
+    let may_name = ["import", "texture"].iter().any(|word| source.text.contains(word));
+    let Some(ast) = may_name.then(|| glance(source)).flatten() else { return Default::default() };
+    let imports = ast.statements().iter().filter_map(|statement| import(statement).ok().flatten());
+    (imports.collect(), textures(&ast))
 }
 
 /// Parses a script for what it names, whatever a plug-in may have added to the language.
@@ -242,11 +245,6 @@ pub(super) fn textures(ast: &AST) -> Vec<NamedTexture> {
         }
     });
     found
-}
-
-/// The images that a script names, for those who look them up; none if it cannot be parsed.
-pub(super) fn named_textures(source: &Arc<Source>) -> Vec<NamedTexture> {
-    glance(source).map_or_else(Vec::new, |ast| textures(&ast))
 }
 
 /// What a word or a text becomes in the second parse.

@@ -360,11 +360,13 @@ bitflags! {
         const PRIORITY = 1 << 13;
         /// `color`: final radiance; where given, lighting is bypassed.
         const COLOR = 1 << 14;
+        /// `line_opacity`: 0 … 1; default 1. Lines that are not opaque show the lines behind them.
+        const LINE_OPACITY = 1 << 15;
     }
 }
 
 /// The keys of the record, in the order of the bits.
-pub const OUTPUTS: [Output; 15] = [
+pub const OUTPUTS: [Output; 16] = [
     Output {
         name: "base_color",
         output: OutputSet::BASE_COLOR,
@@ -499,6 +501,15 @@ pub const OUTPUTS: [Output; 15] = [
         range: "",
         default: "lighting decides",
         about: "final colour; lighting is bypassed",
+    },
+    Output {
+        name: "line_opacity",
+        output: OutputSet::LINE_OPACITY,
+        kind: "number",
+        unit: "",
+        range: "0 … 1",
+        default: "1",
+        about: "opacity of the lines; those that are not opaque show the lines behind them",
     },
 ];
 

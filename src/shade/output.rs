@@ -24,6 +24,7 @@ pub(super) struct Row {
     feature: Option<Vec3>,
     line_color: Option<Vec3>,
     line_width: Option<f32>,
+    line_opacity: Option<f32>,
     priority: Option<i32>,
     color: Option<Vec3>,
     /// By place in the list of names; may be shorter than it.
@@ -50,6 +51,7 @@ pub(super) mod defaults {
     pub const EMISSION: Vec3 = Vec3::ZERO;
     pub const OCCLUSION: f32 = 1.0;
     pub const FEATURE: Vec3 = Vec3::ZERO;
+    pub const LINE_OPACITY: f32 = 1.0;
 }
 
 impl Row {
@@ -93,6 +95,7 @@ impl Row {
             "feature" => self.feature = color()?,
             "line_color" => self.line_color = color()?,
             "line_width" => self.line_width = number()?,
+            "line_opacity" => self.line_opacity = number()?,
             "priority" => self.priority = Some(whole(key, value)?),
             "color" => self.color = color()?,
             _ => {
@@ -166,12 +169,13 @@ pub(super) fn start(outputs: &mut OutputBatch, aovs: usize) {
         feature,
         line_color,
         line_width,
+        line_opacity,
         priority,
         color,
         aovs: extra,
     } = outputs;
     *len = 0;
-    for column in [metallic, roughness, specular, ior, transmission, opacity, occlusion] {
+    for column in [metallic, roughness, specular, ior, transmission, opacity, occlusion, line_opacity] {
         column.clear();
     }
     for column in [base_color, emission, feature] {
@@ -205,6 +209,7 @@ macro_rules! columns {
             LINE_WIDTH line_width $row.line_width;
             PRIORITY priority $row.priority;
             COLOR color $row.color;
+            LINE_OPACITY line_opacity $row.line_opacity.unwrap_or(defaults::LINE_OPACITY);
         );
         for (index, $column) in $outputs.aovs.iter_mut().enumerate() {
             let $value = $row.aovs.get(index).copied().flatten().unwrap_or(Vec3::ZERO);

@@ -30,8 +30,9 @@ pub struct TextureRequest {
 /// What a script asks for; nothing if it cannot be parsed, which compiling will report.
 #[must_use]
 pub fn requests(source: &Arc<Source>) -> Requests {
-    let imports = link::imports(source).into_iter();
-    let textures = link::named_textures(source).into_iter().map(|texture| TextureRequest {
+    let (imports, textures) = link::named_files(source);
+    let imports = imports.into_iter();
+    let textures = textures.into_iter().map(|texture| TextureRequest {
         span: span(source, texture.path_position),
         options: texture.options.into_iter().map(|(text, position)| (text, span(source, position))).collect(),
         path: texture.path,

@@ -6,6 +6,8 @@
 //! branches of scripts are taken as often as they would be. Most hits are the camera's; some are mirrored, refracted,
 //! shadow rays, or seen from behind.
 //!
+//! No hit has attributes, so that `hit.attribute` gives its default.
+//!
 //! The same call gives the same bits on every machine. `tusche shader check` and `bench` run shaders over these hits.
 
 use std::f32::consts::TAU;
@@ -60,6 +62,8 @@ struct Place {
     object_id: u32,
     polygon_id: u32,
     curvature: f32,
+    /// How far uv moves along one world unit, about.
+    uv_per_unit: f32,
 }
 
 fn push(batch: &mut HitBatch, random: &mut Random) {
@@ -96,6 +100,8 @@ fn push(batch: &mut HitBatch, random: &mut Random) {
     batch.front_facing.push(front);
     batch.pixels_per_unit.push(PIXELS_AT_UNIT_DISTANCE / depth);
     batch.curvature.push(place.curvature * side);
+    batch.footprint.push(depth / PIXELS_AT_UNIT_DISTANCE);
+    batch.uv_footprint.push(depth / PIXELS_AT_UNIT_DISTANCE * place.uv_per_unit);
     batch.lights.extend([sun(place.position, place.normal), lamp(place.position, place.normal)]);
 }
 
@@ -115,6 +121,7 @@ fn on_ball(random: &mut Random) -> Place {
         object_id: 1,
         polygon_id: (cell.y * AROUND + cell.x) as u32,
         curvature: 1.0,
+        uv_per_unit: 1.0 / TAU,
     }
 }
 
@@ -139,6 +146,7 @@ fn on_plane(random: &mut Random) -> Place {
         object_id: 2,
         polygon_id: (cell.y * CELLS + cell.x) as u32,
         curvature: 0.0,
+        uv_per_unit: 0.5 / PLANE_HALF,
     }
 }
 
@@ -256,9 +264,11 @@ mod tests {
             front_facing.len(),
             hits.pixels_per_unit.len(),
             hits.curvature.len(),
+            hits.footprint.len(),
+            hits.uv_footprint.len(),
             lights.len() / LIGHTS,
         ];
-        assert_eq!(lengths, [*len; 18]);
+        assert_eq!(lengths, [*len; 20]);
         for kind in [PathKind::Camera, PathKind::Reflection, PathKind::Refraction, PathKind::Shadow] {
             assert!(path_kind.contains(&kind), "{kind:?}");
         }

@@ -275,6 +275,7 @@ impl TileTracer<'_> {
             depth: hit.depth,
             line_color: value(&batch.line_color, row, None).unwrap_or(lines.color).to_array(),
             line_width: if object.lines { width } else { 0.0 },
+            line_opacity: value(&batch.line_opacity, row, 1.0),
             priority,
             throughput: [1.0; 3],
             contribution: [0.0; 3],

@@ -1,4 +1,7 @@
-//! How much sooner the search finds the oracle's lines: `cargo bench --bench line_search -- [WIDTH...]`.
+//! How much sooner the search finds the oracle's lines: `cargo bench --bench line_search -- [OPTIONS] [WIDTH...]`.
+//!
+//! Options: `--any-pair` searches as for a picture without layers by line type, `--no-brute` leaves out the oracle,
+//! `--quick` takes a part of the picture. The oracle is left out where it would take minutes.
 //!
 //! The picture is synthetic (no ray tracer): discs and straight edges at several depths before a background that the
 //! camera misses, one disc with a priority, one domed so that creases are tested too. Most of it is far from any edge.
@@ -12,37 +15,62 @@ use std::time::Instant;
 
 use picture::{Tiles, layout, sampled};
 use tusche::line::{LineTile, Method, Rules, TileBounds, find_lines};
-use tusche::sample::{Node, PixelRect};
+use tusche::sample::{Node, NodeColumnSet, PixelRect, SampleLayout};
 use tusche::scene::settings::LineSettings;
 
 const PICTURE: PixelRect = PixelRect { x0: 0, y0: 0, x1: 512, y1: 384 };
+/// A part of it.
+const QUARTER: PixelRect = PixelRect { x0: 64, y0: 96, x1: 320, y1: 288 };
 const TILE: i32 = 32;
+/// What a picture with the lines of this one keeps.
+const COLUMNS: NodeColumnSet = NodeColumnSet {
+    uv: false,
+    normal: true,
+    feature: false,
+    depth: true,
+    lines: true,
+    throughput: false,
+    contribution: false,
+};
 
 fn main() {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
     // `cargo test --all-targets` runs benchmarks too, without this flag.
-    if !std::env::args().any(|argument| argument == "--bench") {
+    if !arguments.iter().any(|argument| argument == "--bench") {
         return;
     }
-    let asked: Vec<f32> = std::env::args().filter_map(|argument| argument.parse().ok()).collect();
+    let has = |option: &str| arguments.iter().any(|argument| argument == option);
+    let options = Options { any_pair: has("--any-pair"), brute: !has("--no-brute"), quick: has("--quick") };
+    let asked: Vec<f32> = arguments.iter().filter_map(|argument| argument.parse().ok()).collect();
     let widths = if asked.is_empty() { vec![1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0] } else { asked };
     println!(
-        "| width, px | samples | prepare, ns | brute, ns | search, ns | ratio | pairs, brute | pairs, search | lined |"
+        "| width, px | samples | bytes | prepare, ns | brute, ns | search, ns | ratio | pairs, brute | pairs, search | lined |"
     );
-    println!("|---|---|---|---|---|---|---|---|---|");
+    println!("|---|---|---|---|---|---|---|---|---|---|");
     for width in widths {
-        for samples_per_pixel in [4, 16, 64] {
-            measure(width, samples_per_pixel);
+        for samples_per_pixel in [4, 16, 64, 256] {
+            measure(width, samples_per_pixel, options);
         }
     }
 }
 
-fn measure(width: f32, samples_per_pixel: u32) {
+#[derive(Clone, Copy)]
+struct Options {
+    any_pair: bool,
+    brute: bool,
+    quick: bool,
+}
+
+fn measure(width: f32, samples_per_pixel: u32, options: Options) {
     let settings =
         LineSettings { max_width: width, width, normal: Some(30.0), object: true, shader: true, ..Default::default() };
     let rules = Rules::new(&settings, samples_per_pixel);
-    let layout = layout(samples_per_pixel, width);
+    let rules = if options.any_pair { rules.with_any_pair() } else { rules };
+    let layout = SampleLayout { columns: COLUMNS, ..layout(samples_per_pixel, width) };
     let node = |at| node(at, width);
-    let tiles = Tiles::new(PICTURE, TILE, &rules, |tile| sampled(tile, &layout, &node));
+    // The same picture at a rate that keeps the number of samples within bounds.
+    let picture = if options.quick || samples_per_pixel > 64 { QUARTER } else { PICTURE };
+    let tiles = Tiles::new(picture, TILE, &rules, |tile| sampled(tile, &layout, &node));
     let samples = tiles.samples() as f64;
 
     let preparing = nanoseconds(|| {
@@ -61,9 +89,12 @@ fn measure(width: f32, samples_per_pixel: u32) {
 
     // Brute force takes small crops along the diagonal: its time hardly depends on what it sees.
     let side = if width * (samples_per_pixel as f32) > 500.0 { 4 } else { 16 };
+    let affordable = width * width * samples_per_pixel as f32 <= 32.0 * 32.0 * 64.0;
+    let crops = if options.brute && affordable { (1..9).collect() } else { Vec::new() };
     let (mut brute, mut brute_pairs, mut brute_samples) = (0.0, 0, 0.0);
-    for step in 1..9 {
-        let [x0, y0] = [PICTURE.x1 * step / 9, PICTURE.y1 * step / 9];
+    for step in crops {
+        let [x0, y0] =
+            [picture.x0 + picture.width() as i32 * step / 9, picture.y0 + picture.height() as i32 * step / 9];
         let crop = sampled(PixelRect { x0, y0, x1: x0 + side, y1: y0 + side }, &layout, &node);
         let bounds = TileBounds::new(&crop, &rules);
         let target = LineTile { buffer: &crop, bounds: &bounds };
@@ -75,8 +106,9 @@ fn measure(width: f32, samples_per_pixel: u32) {
 
     let [preparing, search, brute] = [preparing / samples, search / samples, brute * 1e9 / brute_samples];
     println!(
-        "| {width} | {samples_per_pixel} | {preparing:.1} | {brute:.0} | {search:.1} | {:.0} | {:.0} | {:.2} | {:.0} % |",
-        brute / search,
+        "| {width} | {samples_per_pixel} | {:.1} | {preparing:.1} | {brute:.0} | {search:.1} | {:.0} | {:.0} | {:.2} | {:.0} % |",
+        tiles.bytes() as f64 / samples,
+        brute / (preparing + search),
         brute_pairs as f64 / brute_samples,
         pairs as f64 / samples,
         lined as f64 / samples * 100.0,

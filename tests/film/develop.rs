@@ -1,9 +1,9 @@
 //! Developing against theory and against plain loops in double precision.
 
 use proptest::prelude::*;
-use tusche::film::{FilmTile, FilmWindow, Filter, Layer, develop};
-use tusche::line::{Fired, LineType};
-use tusche::sample::{PixelRect, SampleColor};
+use tusche::film::{FilmTile, FilmWindow, Filter, Layer, LinePath, develop};
+use tusche::line::{Fired, LineType, SeenLine};
+use tusche::sample::{NodePath, PixelRect, SampleColor};
 use tusche::scene::settings::FilterKind;
 
 use super::filter::KINDS;
@@ -103,6 +103,45 @@ fn a_constant_picture_stays_constant() {
                 for value in &tile.channels[channel] {
                     assert!((value - expected).abs() <= tolerance, "{kind:?} {radius}, channel {channel}: {value}");
                 }
+            }
+        }
+    }
+}
+
+/// What a compositor does with half floats: the lines over what lies below them are the picture with lines, and the lines
+/// by type and by path add up to the lines.
+#[test]
+fn layers_rebuild_the_picture() {
+    let random = Samples::noise([11, 9], 5);
+    let samples = Samples {
+        line: |x, y, s| {
+            let line = (Samples::noise([11, 9], 5).line)(x, y, s)?;
+            let path = NodePath::CAMERA;
+            let path =
+                [path, path.reflected(), path.refracted(), path.reflected().refracted()][(s as usize + x as usize) % 4];
+            let color = (Samples::noise([11, 9], 5).color)(x, y, s).color;
+            let mix = |i: usize| color[i] * (1.0 - line.alpha) + line.color[i] * line.alpha;
+            Some(SeenLine { lined: [mix(0), mix(1), mix(2)], path, ..line })
+        },
+        ..random
+    };
+    let half = |x: f32| half::f16::from_f32(x).to_f32();
+    let types = Layer::FIXED.into_iter().filter(|layer| matches!(layer, Layer::LineType(_)));
+    let paths = [LinePath::Camera, LinePath::Reflection, LinePath::Refraction].map(Layer::LinePath);
+    let layers: Vec<_> = [Layer::Rgba, Layer::Line, Layer::Below].into_iter().chain(types).chain(paths).collect();
+    for kind in [FilterKind::Box, FilterKind::Tent, FilterKind::Gaussian, FilterKind::BlackmanHarris] {
+        let tile = whole(&samples, &Filter::new(kind, 1.5), &layers);
+        let value = |layer: usize, channel: usize, i: usize| tile.channels[4 * layer + channel][i];
+        for i in 0..tile.rect.pixels() {
+            for channel in 0..4 {
+                let [rgba, line, below] = [0, 1, 2].map(|layer| half(value(layer, channel, i)));
+                let over = line + (1.0 - half(value(1, 3, i))) * below;
+                // Half floats have 11 bits; three of them are rounded here.
+                let tolerance = 3.0 / 2048.0 * rgba.abs().max(below.abs()).max(1.0);
+                assert!((over - rgba).abs() < tolerance, "{kind:?}, pixel {i}, channel {channel}: {over}, not {rgba}");
+                let sum = |layers: std::ops::Range<usize>| layers.map(|layer| value(layer, channel, i)).sum::<f32>();
+                assert!((sum(3..9) - value(1, channel, i)).abs() < 1e-5, "types, pixel {i}");
+                assert!((sum(9..12) - value(1, channel, i)).abs() < 1e-5, "paths, pixel {i}");
             }
         }
     }

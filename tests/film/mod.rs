@@ -8,7 +8,7 @@ mod layer;
 
 use tusche::film::FilmWindow;
 use tusche::line::{Fired, LineBuffer, LineCounts, SeenLine};
-use tusche::sample::{Column, NodeColumns, NodePath, PixelRect, SampleBuffer, SampleColor};
+use tusche::sample::{Column, NodeColumns, NodePath, PixelRect, Rows, SampleBuffer, SampleColor};
 
 /// A picture made of samples that depend on nothing but their pixel and number.
 struct Samples {
@@ -78,8 +78,7 @@ impl Samples {
         let object = self.object;
         let nodes = NodeColumns {
             path: NodePath::CAMERA,
-            first: (0..=rect.pixels() as u32).map(|pixel| pixel * self.samples_per_pixel).collect(),
-            sample: (0..at.len() as u32).collect(),
+            rows: Rows::Every { samples: at.len() as u32, per_pixel: self.samples_per_pixel },
             object: values(&at, object),
             shader: values(&at, object),
             uv: values(&at, |x, y, s| [unit(x, y, s, 20), unit(x, y, s, 21)]),
@@ -91,6 +90,7 @@ impl Samples {
             ),
             line_color: Column::Constant([0.0; 3]),
             line_width: Column::Constant(1.0),
+            line_opacity: Column::Constant(1.0),
             priority: Column::Constant(0),
             throughput: Column::Constant([1.0; 3]),
             contribution: Column::Constant([0.0; 3]),
@@ -99,7 +99,8 @@ impl Samples {
             rect,
             samples_per_pixel: self.samples_per_pixel,
             offset: at.iter().map(|&(x, y, s)| (self.offset)(x, y, s)).collect(),
-            color: at.iter().map(|&(x, y, s)| (self.color)(x, y, s)).collect(),
+            color: at.iter().map(|&(x, y, s)| (self.color)(x, y, s).color).collect(),
+            alpha: values(&at, |x, y, s| (self.color)(x, y, s).alpha),
             position: triple(60),
             aovs: vec![Column::Constant([0.25, 0.5, 4.0]), triple(70)],
             paths: vec![nodes],

@@ -116,7 +116,7 @@ fn difference(a: &OutputBatch, b: &OutputBatch) -> Option<String> {
 }
 
 /// A scene of nothing but one material; its parameter `map`, if the script has one, is a small texture.
-fn scene(script: &str) -> Scene {
+pub fn scene(script: &str) -> Scene {
     let projection = Projection::Orthographic { height: 2.0 };
     let camera =
         Camera::look_at("camera", projection, DVec3::Z, DVec3::ZERO, DVec3::Y).expect("it looks at the origin");

@@ -2,6 +2,7 @@
 
 #[path = "../fuzz/agree.rs"]
 pub mod agree;
+mod cases;
 #[path = "../fuzz/scripts.rs"]
 mod scripts;
 

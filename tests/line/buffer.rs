@@ -1,8 +1,8 @@
 //! How sample buffers are filled, and what their gate stops (DESIGN section 3.7).
 
 use tusche::sample::{
-    Column, GateCounts, HandMadeSample, Node, NodeColumnSet, NodePath, PixelRect, SampleBuffer, SampleBufferBuilder,
-    SampleColor, SampleLayout,
+    Column, GateCounts, HandMadeSample, Node, NodeColumnSet, NodePath, PixelRect, Rows, SampleBuffer,
+    SampleBufferBuilder, SampleColor, SampleLayout,
 };
 
 use super::picture::layout;
@@ -88,8 +88,8 @@ fn columns_that_are_not_kept_cost_nothing_and_are_not_counted() {
     assert_eq!((&nodes.uv, &nodes.line_width), (&Column::Constant([0.0; 2]), &Column::Constant(0.0)));
     assert_eq!(nodes.normal, Column::Constant([0.0, 0.0, 1.0]));
     assert_eq!(buffer.gate, [GateCounts::default()], "no materials, so misses alone");
-    // Offsets 16, colours 32, first 12, samples 8, and one count.
-    assert_eq!(buffer.bytes(), 16 + 32 + 12 + 8 + size_of::<GateCounts>());
+    // Offsets, colours, and one count.
+    assert_eq!(buffer.bytes(), 16 + 24 + size_of::<GateCounts>());
 }
 
 #[test]
@@ -115,8 +115,8 @@ fn colors_and_extra_outputs_count_with_the_node_that_made_them() {
     builder.set_extras(1, [1.0; 3], &[[f32::INFINITY; 3]]);
     let buffer = builder.finish();
     assert_eq!(buffer.offset[0], [0.0, 1.0]);
-    assert_eq!(buffer.color[0], SampleColor { color: [0.0, 0.5, 0.5], alpha: 1.0 });
-    assert_eq!(buffer.color[2], SampleColor::default());
+    assert_eq!((buffer.color[0], buffer.alpha.get(0)), ([0.0, 0.5, 0.5], 1.0));
+    assert_eq!((buffer.color[2], buffer.alpha.get(2)), ([0.0; 3], 0.0));
     assert_eq!(values(&buffer.position, 3), [[0.0, 1.0, 2.0], [1.0; 3], [0.0; 3]]);
     assert_eq!(values(&buffer.aovs[0], 3), [[0.0, 1.0, 2.0], [0.0; 3], [0.0; 3]]);
     assert_eq!(buffer.gate[4], GateCounts { nan: 1, infinite: 1, ..Default::default() });
@@ -147,8 +147,9 @@ fn nodes_may_come_in_any_order() {
     let (in_order, shuffled) = (in_order.finish(), shuffled.finish());
     assert_eq!(in_order, shuffled);
     let reflected = in_order.nodes(r).expect("pushed");
-    assert_eq!((&reflected.first[..], &reflected.sample[..]), (&[0, 1, 2, 3][..], &[0, 3, 5][..]));
-    assert_eq!([0, 1, 3, 5].map(|sample| reflected.row_of(sample, 2)), [Some(0), None, Some(1), Some(2)]);
+    assert_eq!(reflected.rows, Rows::Some { first: vec![0, 1, 2, 3], sample: vec![0, 3, 5] });
+    assert_eq!([0, 1, 2].map(|pixel| reflected.rows.of_pixel(pixel)), [0..1, 1..2, 2..3]);
+    assert_eq!(in_order.paths[0].rows, Rows::Every { samples: 6, per_pixel: 2 });
     assert_eq!(in_order.nodes(CAMERA.refracted()), None);
     assert_eq!(in_order.pixel_of(3), [6, -3]);
     assert_eq!(in_order.pixel_number([6, -3]), 1);
@@ -161,8 +162,24 @@ fn a_sample_without_a_camera_node_is_a_miss() {
     builder.push(CAMERA, 1, hit(1));
     let buffer = builder.finish();
     assert_eq!(values(&buffer.paths[0].object, 3), [0, 1, 0]);
-    assert_eq!(buffer.paths[0].first, [0, 1, 2, 3]);
+    assert_eq!(buffer.paths[0].rows, Rows::Every { samples: 3, per_pixel: 1 });
     let empty =
         SampleBufferBuilder::new(row(0), &SampleLayout { columns: NodeColumnSet::ALL, ..layout(4, 8.0) }).finish();
-    assert_eq!((empty.samples(), empty.paths.len(), &empty.paths[0].first[..]), (0, 1, &[0][..]));
+    assert_eq!((empty.samples(), empty.paths.len(), empty.paths[0].rows.is_empty()), (0, 1, true));
+}
+
+#[test]
+fn columns_take_the_shortest_form_that_is_exact() {
+    // As many values as there are, each several times in a run, then as many again in the same order.
+    let column = |distinct: u32| {
+        let nodes: Vec<_> = (0..4096).map(|i| Node { object: 1 + i / 8 % distinct, ..hit(1) }).collect();
+        let buffer = buffer_of(&nodes);
+        assert_eq!(values(&buffer.paths[0].object, 4096), nodes.iter().map(|node| node.object).collect::<Vec<_>>());
+        buffer.paths[0].object.clone()
+    };
+    assert_eq!(column(1).bytes(), 0);
+    assert_eq!(column(2).bytes(), 4096 + 2 * 4);
+    assert_eq!(column(16).bytes(), 4096 + 16 * 4);
+    assert!(matches!(column(300), Column::Values(_)));
+    assert_eq!(column(300).bytes(), 4096 * 4);
 }

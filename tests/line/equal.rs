@@ -36,23 +36,29 @@ fn node() -> impl Strategy<Value = Node> {
         (0..3u32, 1..3u32, [unit(), unit()], few(normals), [unit(), unit(), unit()]),
         // Equal depths must be common: they are what ties are about.
         prop_oneof![3 => few([1.0, 2.0, 3.0]), 1 => 1.0..3.0f32],
-        few([0.0, -1.0, 0.1, 0.5, 1.0, 2.5, 4.0, 1e9, f32::NAN]),
+        (
+            few([0.0, -1.0, 0.1, 0.5, 1.0, 2.5, 4.0, 1e9, f32::NAN]),
+            few([1.0, 1.0, 1.0, 1.0, 0.5, 0.25, 0.0, f32::NAN, 7.0, -1.0]),
+        ),
         few([0, 0, 0, 1, -1, i32::MIN, i32::MAX]),
         ([unit(), unit(), unit()], [unit(), unit(), unit()], [unit(), unit(), unit()]),
     )
-        .prop_map(|((object, shader, uv, normal, feature), depth, line_width, priority, colors)| Node {
-            object,
-            shader,
-            uv,
-            normal,
-            feature,
-            depth,
-            line_color: colors.0,
-            line_width,
-            priority,
-            throughput: colors.1,
-            contribution: colors.2,
-        })
+        .prop_map(
+            |((object, shader, uv, normal, feature), depth, (line_width, line_opacity), priority, colors)| Node {
+                object,
+                shader,
+                uv,
+                normal,
+                feature,
+                depth,
+                line_color: colors.0,
+                line_width,
+                line_opacity,
+                priority,
+                throughput: colors.1,
+                contribution: colors.2,
+            },
+        )
 }
 
 /// Random pixels as a renderer makes them: mostly one of a few nodes, so that some blocks are uniform.
@@ -134,8 +140,11 @@ impl std::fmt::Debug for Case {
 }
 
 impl Case {
-    fn cut(&self, side: i32) -> Tiles {
-        let rules = Rules::new(&self.settings, self.samples_per_pixel);
+    fn rules(&self) -> Rules {
+        Rules::new(&self.settings, self.samples_per_pixel)
+    }
+
+    fn cut(&self, side: i32, rules: Rules) -> Tiles {
         Tiles::new(self.rect, side, &rules, |tile| self.buffer(tile))
     }
 
@@ -186,13 +195,28 @@ proptest! {
 
     #[test]
     fn the_search_is_the_oracle_and_tiles_do_not_matter(case in case()) {
-        let whole = case.cut(64);
+        let whole = case.cut(64, case.rules());
         let expected = case.by_place(&whole.lines(Method::Brute));
         prop_assert_eq!(&case.by_place(&whole.lines(Method::Exact)), &expected, "search, one tile");
         for side in case.tiles {
-            let cut = case.cut(side);
+            let cut = case.cut(side, case.rules());
             prop_assert_eq!(&case.by_place(&cut.lines(Method::Brute)), &expected, "brute, tiles of {}", side);
             prop_assert_eq!(&case.by_place(&cut.lines(Method::Exact)), &expected, "search, tiles of {}", side);
+        }
+    }
+
+    #[test]
+    fn any_pair_looks_like_the_one_that_is_seen(case in case()) {
+        let looks = |tiles: Tiles, method: Method| -> Vec<_> {
+            let lines = case.by_place(&tiles.lines(method)).into_iter();
+            lines.map(|(pixel, sample, (floats, text))| {
+                (pixel, sample, floats, text.split(' ').next().map(str::to_owned))
+            }).collect()
+        };
+        let expected = looks(case.cut(64, case.rules()), Method::Brute);
+        for side in [64].into_iter().chain(case.tiles) {
+            let rules = case.rules().with_any_pair();
+            prop_assert_eq!(&looks(case.cut(side, rules), Method::Exact), &expected, "tiles of {}", side);
         }
     }
 }

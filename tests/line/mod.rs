@@ -1,6 +1,7 @@
 //! The line pass: oracle against text, search against oracle, both against areas that are known.
 
 mod area;
+mod baselines;
 mod buffer;
 mod equal;
 pub mod picture;

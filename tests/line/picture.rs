@@ -75,6 +75,12 @@ impl Tiles {
         (0..self.tiles.len()).map(|index| self.lines_of(index, method)).collect()
     }
 
+    /// Bytes of all samples and bounds.
+    #[allow(dead_code, reason = "only the benchmark asks")]
+    pub fn bytes(&self) -> usize {
+        self.tiles.iter().map(|(buffer, bounds)| buffer.bytes() + bounds.bytes()).sum()
+    }
+
     /// Number of samples.
     #[allow(dead_code, reason = "only the benchmark asks")]
     pub fn samples(&self) -> usize {

@@ -317,3 +317,35 @@ fn a_picture_without_samples_has_no_lines() {
     let off = LineSettings { max_width: 0.0, ..settings() };
     assert_eq!(stylists(&camera_lines(&[hit(1, 1.0, 3.0), MISS()], &off)), [None, None]);
 }
+
+/// Three lines on one sample: a half-transparent one in front, one of half the minimum width, and an opaque one.
+#[test]
+fn lines_that_are_not_opaque_show_the_lines_behind_them() {
+    let node = |object: u32, depth: f32, red: f32, opacity: f32| Node {
+        line_color: [red, 0.0, 0.0],
+        line_opacity: opacity,
+        ..hit(object, depth, 9.0)
+    };
+    let target = hit(9, 8.0, 0.0);
+    let nodes =
+        [node(1, 1.0, 1.0, 0.5), node(2, 2.0, 0.5, 0.5), target, node(3, 3.0, 0.25, 1.0), node(4, 4.0, 8.0, 1.0)];
+    let seen = |nodes: &[Node]| camera_lines(nodes, &settings())[2].expect("lines all around");
+    let line = seen(&nodes);
+    // Half of 1, half of the rest of 0.5, and all that remains of 0.25; nothing of 8.
+    let mixed = 0.5 + 0.25 * 0.5 + 0.25 * 0.25;
+    assert_eq!((line.alpha, line.color[0], line.lined), (1.0, mixed, [mixed, 0.0, 0.0]));
+    assert_eq!(line.neighbor.0[0], 0, "what else is told is of the line in front");
+
+    // Without the opaque ones, a quarter of the sample's colour is left.
+    let through = seen(&nodes[..3]);
+    assert_eq!((through.alpha, through.lined[1]), (0.75, 0.25 * GRAY[1]));
+
+    // An edge is one line, however many pairs see it, and whichever side draws it.
+    let twice = [nodes[0], nodes[0], target, nodes[0], nodes[0]];
+    assert_eq!(seen(&twice).alpha, 0.5);
+    let edge = [node(1, 5.0, 1.0, 0.5), node(1, 1.0, 1.0, 0.5), node(2, 3.0, 1.0, 0.5)];
+    assert_eq!(seen(&edge).alpha, 0.5, "one neighbour outranks the target and one does not");
+    // So is the outline of one object before several others.
+    let before_two = [node(3, 7.0, 1.0, 0.0), node(1, 7.0, 1.0, 0.0), node(2, 3.0, 1.0, 0.5), node(4, 7.0, 1.0, 0.0)];
+    assert_eq!(seen(&before_two).alpha, 0.5);
+}

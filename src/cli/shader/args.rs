@@ -16,8 +16,8 @@ pub enum ShaderCommand {
     New(NewArguments),
     /// Renders shaders on a ball and a knot.
     Preview(PreviewArguments),
-    /// Prints the reference of the shading language as Markdown: every input, output and function.
-    Reference,
+    /// Prints every input, output and function that shaders know.
+    Reference(ReferenceArguments),
 }
 
 /// Which shaders, with which parameters.
@@ -88,4 +88,11 @@ pub struct NewArguments {
     /// Starts from this shader: `template`, or one that comes with Tusche.
     #[arg(long, value_name = "TEMPLATE", default_value = "template")]
     pub from: String,
+}
+
+#[derive(Debug, Args)]
+pub struct ReferenceArguments {
+    /// Prints Markdown, as in shaders/README.md, instead of text for a terminal.
+    #[arg(long)]
+    pub markdown: bool,
 }

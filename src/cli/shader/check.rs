@@ -39,7 +39,7 @@ pub(super) fn run(arguments: &CheckArguments) -> Result<(), Failure> {
     if failed { Err(Failure::Silent) } else { Ok(()) }
 }
 
-/// What standard output gets of one shader: its name, a verdict, and the report if there is one.
+/// What standard output gets of one shader: its name, a verdict, and the report if there are no errors, which come first.
 fn text(path: &Path, found: &Check) -> String {
     let count = |severity| found.diagnostics.0.iter().filter(|d| d.severity == severity).count();
     let plural = |count: usize, what: &str| match count {
@@ -50,6 +50,7 @@ fn text(path: &Path, found: &Check) -> String {
     let counts = [(Severity::Error, "error"), (Severity::Warning, "warning")];
     let verdict: Vec<_> = counts.iter().filter_map(|(severity, what)| plural(count(*severity), what)).collect();
     let verdict = if verdict.is_empty() { "no faults".to_owned() } else { verdict.join(", ") };
-    let report = found.report.as_ref().map_or_else(String::new, ToString::to_string);
+    let report = found.report.as_ref().filter(|_| !found.diagnostics.has_errors());
+    let report = report.map_or_else(String::new, ToString::to_string);
     format!("{}: {verdict}\n{report}", path.display())
 }

@@ -12,8 +12,8 @@
 //!           "hints": ["did you mean `base_color`?"] } ],
 //!       "report": null |                null if the shader does not compile or cannot be read
 //!         { "mode": "constant" | "kernel" | "interpreted",
-//!           "blame": { "line": 3, "column": 5, "message": "…" } | null,     why it is interpreted, where known
-//!           "ns_per_hit": 1700.0 | null,          of an interpreted shader, measured
+//!           "blame": null | { as in "diagnostics" },         why it is interpreted, where known
+//!           "ns_per_hit": 1700.0 | null,          measured; null for a constant shader, or one that fails
 //!           "complete": true,                     whether the facts below are known to be complete
 //!           "inputs": ["irradiance"],             what is read on `hit`, in the order of the contract
 //!           "outputs": [                          what may be returned, in the order of the contract
@@ -35,7 +35,6 @@ use serde::Serialize;
 use serde_json::Value as Json;
 
 use crate::diag::{Diagnostic, Severity, Span};
-use crate::shade::analysis::Finding;
 use crate::shade::check::{Check, Report};
 use crate::shade::params::Value;
 
@@ -78,20 +77,13 @@ struct Place {
 #[derive(Serialize)]
 struct Facts {
     mode: &'static str,
-    blame: Option<Blame>,
+    blame: Option<Entry>,
     ns_per_hit: Option<f64>,
     complete: bool,
     inputs: Vec<&'static str>,
     outputs: Vec<Output>,
     parameters: Vec<Parameter>,
     max_line_width: Option<f32>,
-}
-
-#[derive(Serialize)]
-struct Blame {
-    line: usize,
-    column: usize,
-    message: String,
 }
 
 #[derive(Serialize)]
@@ -165,7 +157,7 @@ impl Facts {
     fn new(report: &Report) -> Self {
         Self {
             mode: report.mode.name(),
-            blame: report.blame.as_ref().map(Blame::new),
+            blame: report.blame.as_ref().map(Entry::new),
             ns_per_hit: report.nanoseconds_per_hit.map(|cost| (cost * 10.0).round() / 10.0),
             complete: report.analysis.complete,
             inputs: report.inputs(),
@@ -188,13 +180,6 @@ impl Facts {
                 .collect(),
             max_line_width: report.params.max_line_width(),
         }
-    }
-}
-
-impl Blame {
-    fn new(finding: &Finding) -> Self {
-        let (line, column) = finding.place;
-        Self { line, column, message: finding.message.clone() }
     }
 }
 

@@ -6,15 +6,15 @@ mod check;
 mod json;
 mod new;
 mod preview;
+mod reference;
 
 use std::path::Path;
 
-use super::{Failure, print};
+use super::Failure;
 use crate::diag::Diagnostics;
 use crate::files::FileStore;
 use crate::scene::ids::MaterialId;
 use crate::scene::{Scene, SceneBuilder, file};
-use crate::shade::reference;
 pub(super) use args::ShaderCommand;
 
 pub(super) fn run(command: &ShaderCommand) -> Result<(), Failure> {
@@ -23,7 +23,7 @@ pub(super) fn run(command: &ShaderCommand) -> Result<(), Failure> {
         ShaderCommand::Bench(arguments) => bench::run(arguments),
         ShaderCommand::New(arguments) => new::run(arguments),
         ShaderCommand::Preview(arguments) => preview::run(arguments),
-        ShaderCommand::Reference => print(&reference::markdown()),
+        ShaderCommand::Reference(arguments) => reference::run(arguments),
     }
 }
 

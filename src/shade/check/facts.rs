@@ -1,7 +1,7 @@
 //! Warnings from what is known of a shader's outputs and parameters, and from its trial.
 
 use super::{TRIAL_HITS, Trial};
-use crate::diag::{Diagnostic, Diagnostics, Span};
+use crate::diag::{Diagnostic, Diagnostics, Severity, Span};
 use crate::math::Vec3;
 use crate::scene::material::Material;
 use crate::shade::batch::OutputBatch;
@@ -18,10 +18,9 @@ pub(super) fn warnings(shader: &Shader, material: &Material, trial: &Trial, cost
     nan(shader, trial, &mut warnings);
     line_width(shader, trial, &mut warnings);
     without_effect(shader, material, &mut warnings);
-    if let Some(blame) = shader.blame() {
-        let fault = shader.program.found(blame);
+    if let Some(fault) = shader.blame_diagnostic() {
         let mut warning = Diagnostic { message: format!("this shader is interpreted: {}", fault.message), ..fault };
-        warning.severity = crate::diag::Severity::Warning;
+        warning.severity = Severity::Warning;
         warnings.push(match cost {
             Some(cost) => warning.hint(format!("it costs {cost:.0} ns a hit")),
             None => warning,
@@ -70,6 +69,7 @@ fn nan_rows(outputs: &OutputBatch, output: OutputSet) -> usize {
         OutputSet::LINE_COLOR => perhaps(&outputs.line_color),
         OutputSet::LINE_WIDTH => outputs.line_width.iter().flatten().filter(|x| x.is_nan()).count(),
         OutputSet::COLOR => perhaps(&outputs.color),
+        OutputSet::LINE_OPACITY => numbers(&outputs.line_opacity),
         _ => 0,
     }
 }

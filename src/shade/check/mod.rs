@@ -77,7 +77,7 @@ pub fn check(scene: &Scene, material: MaterialId, host: &Host) -> Check {
     };
     let shader = shaders.of(material);
     let trial = Trial::run(scene, &shaders, material);
-    let cost = (shader.mode() == Mode::Interpreted && trial.errors.is_empty()).then(|| {
+    let cost = (shader.mode() != Mode::Constant && trial.errors.is_empty()).then(|| {
         let hits = synthetic::hits(TRIAL_HITS, 0);
         measure::nanoseconds_per_hit(&mut Shading::new(scene, &shaders), material, &hits, REPEATS)
     });
@@ -88,7 +88,7 @@ pub fn check(scene: &Scene, material: MaterialId, host: &Host) -> Check {
     if trial.errors.is_empty() {
         diagnostics.extend(facts::warnings(shader, &scene.materials()[material.index()], &trial, cost));
     }
-    Check { diagnostics: in_order(diagnostics), report: Some(Report::new(shader, cost)) }
+    Check { diagnostics: in_order(diagnostics), report: Some(Report::new(shader, cost, trial.interpreted)) }
 }
 
 /// A scene of nothing but a script's material.
@@ -115,13 +115,16 @@ struct Trial {
     outputs: OutputBatch,
     /// Names of the extra outputs, in the order of their columns.
     aovs: Vec<String>,
+    /// How many hits the interpreter was run for.
+    interpreted: u64,
 }
 
 impl Trial {
     fn run(scene: &Scene, shaders: &Shaders, material: MaterialId) -> Self {
         let (mut outputs, mut errors) = (OutputBatch::default(), ShadeErrors::default());
         let hits = synthetic::hits(TRIAL_HITS, 0);
-        Shading::new(scene, shaders).shade(material, &hits, OutputSet::all(), &mut outputs, &mut errors);
+        let mut shading = Shading::new(scene, shaders);
+        shading.shade(material, &hits, OutputSet::all(), &mut outputs, &mut errors);
         let errors = errors.errors.into_values().map(|(fault, count)| match count {
             // A shader that ran out of operations is not run again, so the count says nothing.
             n if n < TRIAL_HITS as u64 && !fault.message.starts_with(OUT_OF_OPERATIONS) => {
@@ -129,7 +132,12 @@ impl Trial {
             }
             _ => fault,
         });
-        Self { errors: Diagnostics(errors.collect()), outputs, aovs: shaders.aovs().to_vec() }
+        Self {
+            errors: Diagnostics(errors.collect()),
+            outputs,
+            aovs: shaders.aovs().to_vec(),
+            interpreted: shading.evaluations(),
+        }
     }
 }
 

@@ -2,7 +2,9 @@
 
 use std::fmt;
 
-use crate::shade::analysis::{Analysis, Finding, OutputFact};
+use super::TRIAL_HITS;
+use crate::diag::Diagnostic;
+use crate::shade::analysis::{Analysis, OutputFact};
 use crate::shade::names::{AOV_PREFIX, InputSet, OutputSet};
 use crate::shade::params::{Params, Value};
 use crate::shade::program::{Mode, Shader};
@@ -13,9 +15,11 @@ pub struct Report {
     /// How it is run.
     pub mode: Mode,
     /// For an interpreted shader: the construct because of which it is, if one is to blame.
-    pub blame: Option<Finding>,
-    /// For an interpreted shader: nanoseconds of CPU time for each hit, measured on this machine.
+    pub blame: Option<Diagnostic>,
+    /// Of a shader that is not constant: nanoseconds of CPU time for each hit, measured on this machine.
     pub nanoseconds_per_hit: Option<f64>,
+    /// Trial hits that the interpreter was run for. Of a kernel: those that it gave up.
+    pub interpreted_hits: u64,
     /// What it reads and writes.
     pub analysis: Analysis,
     /// Its parameters, with the values that were set.
@@ -23,11 +27,12 @@ pub struct Report {
 }
 
 impl Report {
-    pub(super) fn new(shader: &Shader, nanoseconds_per_hit: Option<f64>) -> Self {
+    pub(super) fn new(shader: &Shader, nanoseconds_per_hit: Option<f64>, interpreted_hits: u64) -> Self {
         Self {
             mode: shader.mode(),
-            blame: shader.blame().cloned(),
+            blame: shader.blame_diagnostic(),
             nanoseconds_per_hit,
+            interpreted_hits,
             analysis: shader.analysis().clone(),
             params: shader.params().clone(),
         }
@@ -62,15 +67,19 @@ impl fmt::Display for Report {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.mode {
             Mode::Constant => writeln!(f, "  mode        constant: evaluated once")?,
-            Mode::Kernel => writeln!(f, "  mode        kernel")?,
+            Mode::Kernel => writeln!(f, "  mode        kernel: runs over batches of hits")?,
             Mode::Interpreted => writeln!(f, "  mode        interpreted, at every hit")?,
         }
         if let Some(blame) = &self.blame {
-            let (line, column) = blame.place;
-            writeln!(f, "  because     line {line}, column {column}: {}", blame.message)?;
+            let place = blame.span.as_ref().map(|span| format!("{span:?}: ")).unwrap_or_default();
+            writeln!(f, "  because     {place}{}", blame.message)?;
         }
         if let Some(cost) = self.nanoseconds_per_hit {
             writeln!(f, "  cost        {cost:.0} ns a hit, measured here")?;
+        }
+        if self.mode == Mode::Kernel && self.interpreted_hits > 0 {
+            let hits = self.interpreted_hits;
+            writeln!(f, "  gives up    {hits} of {TRIAL_HITS} trial hits, which the interpreter runs")?;
         }
         let inputs = self.inputs();
         let reads = match self.analysis.complete {

@@ -63,6 +63,7 @@ pub(super) fn append(
             fill(&mut outputs.priority, present, [registers.int(roots[1])], rows, |[x]| Some(x as i32), None);
         }
         OutputSet::COLOR => maybe_color(&mut outputs.color),
+        OutputSet::LINE_OPACITY => number(&mut outputs.line_opacity, defaults::LINE_OPACITY),
         _ => {}
     }
 }

@@ -773,14 +773,14 @@ fn load<S: Copy, T: Copy>(out: &mut [Block<T>], source: &[S], chunk: &Chunk<'_>,
     let Some(rows) = source.get(chunk.first..chunk.first + chunk.rows) else { return };
     let (whole, rest) = rows.as_chunks::<LANES>();
     for (out, rows) in out.iter_mut().zip(whole) {
-        for lane in 0..LANES {
-            out.0[lane] = pick(rows[lane]);
+        for (out, row) in out.0.iter_mut().zip(rows) {
+            *out = pick(*row);
         }
     }
     if let Some(last) = rest.last() {
         let out = &mut out[whole.len()].0;
-        for lane in 0..LANES {
-            out[lane] = pick(*rest.get(lane).unwrap_or(last));
+        for (lane, out) in out.iter_mut().enumerate() {
+            *out = pick(*rest.get(lane).unwrap_or(last));
         }
     }
 }

@@ -71,6 +71,9 @@ struct Frame {
     /// Exit cells: at which hits the function has returned, and what.
     returned: usize,
     result: usize,
+    /// Variables around the call that it may change (`this`, and what closures have captured), each with the exit cell
+    /// that keeps what it was where hits returned.
+    shares: Vec<(usize, usize)>,
     /// For messages about recursion.
     function: Rc<str>,
     /// Which of the program's files the code stands in.
@@ -415,13 +418,33 @@ impl Lowerer<'_> {
         }
         let cells = self.cells.len();
         let (returned, result) = (self.new_cell(Meaning::bool(false), true), self.new_cell(Meaning::Undefined, true));
+        let outside: Vec<usize> = (0..cells)
+            .filter(|cell| {
+                !self.cells[*cell].exit
+                    && (self.cells[*cell].shared
+                        || names.iter().any(|(name, named)| &**name == "this" && named == cell))
+            })
+            .collect();
+        let shares: Vec<(usize, usize)> =
+            outside.into_iter().map(|cell| (cell, self.new_cell(Meaning::Undefined, true))).collect();
         let entry = self.live;
         // Closures are called within their own file.
         let outer = self.frames.last().map_or(function.file, |frame| frame.file);
         let file = if function.is_closure() { outer } else { function.file };
-        self.frames.push(Frame { names, loops: Vec::new(), returned, result, function: name.into(), file });
+        let frame =
+            Frame { names, loops: Vec::new(), returned, result, shares: shares.clone(), function: name.into(), file };
+        self.frames.push(frame);
         let value = self.statements(&function.body)?;
         self.frames.pop();
+        if let Meaning::Bool(returned) = self.cells[returned].meaning
+            && returned != Operand::FALSE
+        {
+            // What hits that returned early had when they did.
+            for (cell, kept) in shares {
+                let (then, now) = (self.cells[kept].meaning.clone(), self.cells[cell].meaning.clone());
+                self.cells[cell].meaning = if self.is_dead() { then } else { self.builder.join(returned, &then, &now) };
+            }
+        }
         let result = self.cells[result].meaning.clone();
         let value = match (self.live, &self.cells[returned].meaning) {
             (Some(_), Meaning::Bool(Operand::FALSE)) => value,
@@ -442,8 +465,12 @@ impl Lowerer<'_> {
     /// Live hits return from the innermost call.
     fn leave_call(&mut self, value: &Meaning) {
         let (Some(live), Some(frame)) = (self.live, self.frames.last()) else { return };
-        let (returned, result) = (frame.returned, frame.result);
+        let (returned, result, shares) = (frame.returned, frame.result, frame.shares.clone());
         self.leave_into(live, returned, result, value);
+        for (cell, kept) in shares {
+            let (now, before) = (self.cells[cell].meaning.clone(), self.cells[kept].meaning.clone());
+            self.cells[kept].meaning = self.builder.join(live, &now, &before);
+        }
         self.live = None;
     }
 

@@ -144,7 +144,7 @@ impl Lowerer<'_> {
             }
         }
         for range in &cases.ranges {
-            let inside = self.inside(&subject, range, position)?;
+            let inside = self.inside(&subject, range);
             let inside = self.builder.and_not(inside, any);
             tests.push((inside, range.index()));
         }
@@ -200,7 +200,7 @@ impl Lowerer<'_> {
         }
     }
 
-    fn inside(&mut self, subject: &Meaning, range: &RangeCase, position: Position) -> Flow<Operand> {
+    fn inside(&mut self, subject: &Meaning, range: &RangeCase) -> Operand {
         let (low, end, inclusive) = match range {
             RangeCase::ExclusiveInt(range, _) => (range.start, range.end, false),
             RangeCase::InclusiveInt(range, _) => (*range.start(), *range.end(), true),
@@ -208,22 +208,22 @@ impl Lowerer<'_> {
         let under = if inclusive { Comparison::LessEqual } else { Comparison::Less };
         match subject {
             Meaning::Choice(mask, sides) => {
-                let (a, b) = (self.inside(&sides[0], range, position)?, self.inside(&sides[1], range, position)?);
-                Ok(self.builder.select(*mask, a, b))
+                let (a, b) = (self.inside(&sides[0], range), self.inside(&sides[1], range));
+                self.builder.select(*mask, a, b)
             }
             Meaning::Int(x) => {
                 let above = self.builder.emit(Code::CompareInts(Comparison::GreaterEqual), &[*x, Operand::Int(low)]);
                 let below = self.builder.emit(Code::CompareInts(under), &[*x, Operand::Int(end)]);
-                Ok(self.builder.and(above, below))
+                self.builder.and(above, below)
             }
             #[expect(clippy::cast_precision_loss, reason = "an int counts as the nearest float")]
             Meaning::Float(x) => {
                 let (low, end) = (Operand::float(low as f32), Operand::float(end as f32));
                 let above = self.builder.emit(Code::CompareFloats(Comparison::GreaterEqual), &[*x, low]);
                 let below = self.builder.emit(Code::CompareFloats(under), &[*x, end]);
-                Ok(self.builder.and(above, below))
+                self.builder.and(above, below)
             }
-            _ => Ok(Operand::FALSE),
+            _ => Operand::FALSE,
         }
     }
 }

@@ -150,11 +150,11 @@ pub fn cell_id_3d(x: &Lanes, y: &Lanes, z: &Lanes, out: &mut Lanes) {
 /// F1 and F2 − F1 of each lane, less 1 and plus 1 again as the scalar form has it; NaN where `valid` is not.
 #[inline(always)]
 fn distances(nearest: &Nearest, valid: impl Fn(usize) -> bool, out: &mut [Lanes; 2]) {
-    for i in 0..LANES {
+    let [nears, gaps] = out;
+    for (i, (near, gap)) in nears.iter_mut().zip(gaps).enumerate() {
         let (first, second) = (nearest.first[i].sqrt(), nearest.second[i].sqrt());
-        let (near, gap) = ((first - 1.0) + 1.0, (second - first - 1.0) + 1.0);
-        out[0][i] = if valid(i) { near } else { f32::NAN };
-        out[1][i] = if valid(i) { gap } else { f32::NAN };
+        *near = if valid(i) { (first - 1.0) + 1.0 } else { f32::NAN };
+        *gap = if valid(i) { (second - first - 1.0) + 1.0 } else { f32::NAN };
     }
 }
 
