@@ -363,14 +363,17 @@ macro_rules! library_functions {
 /// The most arguments of a [`LibraryFunction`].
 pub(in crate::shade) const MOST_ARGUMENTS: usize = 8;
 
+#[inline(always)]
 fn three(v: Vec3) -> [f32; 4] {
     [v.x, v.y, v.z, 0.0]
 }
 
+#[inline(always)]
 fn two(v: Vec2) -> [f32; 4] {
     [v.x, v.y, 0.0, 0.0]
 }
 
+#[inline(always)]
 fn one(x: f32) -> [f32; 4] {
     [x, 0.0, 0.0, 0.0]
 }

@@ -11,7 +11,7 @@ use smallvec::SmallVec;
 
 use super::ir::{
     BoolBinary, Code, Column, FloatBinaryLoop, FloatTernaryLoop, FloatUnary, FloatUnaryLoop, IntBinaryLoop,
-    IntCheckedLoop, Kind, LibraryLoop, MOST_ARGUMENTS, Noise,
+    IntCheckedLoop, Kind, LibraryFunction, LibraryLoop, MOST_ARGUMENTS, Noise,
 };
 use super::lower::TextureUse;
 use super::slice::{CarriedRegisters, LoopSteps, Register, Runnable, Step};
@@ -455,7 +455,10 @@ impl Registers {
                 for (out, result) in outs.iter_mut().zip(results) {
                     *out = self.floats.take(*result);
                 }
-                function.in_loop(Rows { outs: &mut outs[..results.len()], operands, floats: &self.floats, blocks });
+                let mut rows = Rows { outs: &mut outs[..results.len()], operands, floats: &self.floats, blocks };
+                if !rows.whole_blocks(function) {
+                    function.in_loop(rows);
+                }
                 for (out, result) in outs.into_iter().zip(results) {
                     self.floats.put(*result, out);
                 }
@@ -909,21 +912,63 @@ struct Rows<'a> {
     blocks: usize,
 }
 
+impl Rows<'_> {
+    /// Runs functions that have batch forms of their own; the others are left.
+    #[inline(always)]
+    fn whole_blocks(&mut self, function: LibraryFunction) -> bool {
+        let view = |operand: usize| self.floats.view(self.operands[operand]);
+        match function {
+            LibraryFunction::Worley2 | LibraryFunction::Worley3 => {
+                for index in 0..self.blocks {
+                    let (x, y) = (view(0).block(index), view(1).block(index));
+                    let mut results = [[0.0; LANES]; 2];
+                    match function {
+                        LibraryFunction::Worley2 => batch::worley_2d(x, y, &mut results),
+                        _ => batch::worley_3d(x, y, view(2).block(index), &mut results),
+                    }
+                    for (out, result) in self.outs.iter_mut().zip(results) {
+                        out[index].0 = result;
+                    }
+                }
+                true
+            }
+            LibraryFunction::Layered2(octaves) if view(2).uniform && view(3).uniform => {
+                let (lacunarity, gain) = (view(2).row(0), view(3).row(0));
+                for index in 0..self.blocks {
+                    let (x, y) = (view(0).block(index), view(1).block(index));
+                    batch::layered_2d(x, y, octaves.into(), lacunarity, gain, &mut self.outs[0][index].0);
+                }
+                true
+            }
+            LibraryFunction::Layered3(octaves) if view(3).uniform && view(4).uniform => {
+                let (lacunarity, gain) = (view(3).row(0), view(4).row(0));
+                for index in 0..self.blocks {
+                    let (x, y, z) = (view(0).block(index), view(1).block(index), view(2).block(index));
+                    batch::layered_3d(x, y, z, octaves.into(), lacunarity, gain, &mut self.outs[0][index].0);
+                }
+                true
+            }
+            _ => false,
+        }
+    }
+}
+
 impl LibraryLoop for Rows<'_> {
     #[inline(always)]
     fn run(self, formula: impl Fn([f32; MOST_ARGUMENTS]) -> [f32; 4]) {
         for index in 0..self.blocks {
-            // Transposed for one row after the other.
-            let mut rows = [[0.0; MOST_ARGUMENTS]; LANES];
-            for (argument, operand) in self.operands.iter().enumerate() {
-                let block = self.floats.view(*operand).block(index);
-                for (row, x) in rows.iter_mut().zip(block) {
-                    row[argument] = *x;
-                }
+            let mut arguments = [[0.0; LANES]; MOST_ARGUMENTS];
+            for (argument, operand) in arguments.iter_mut().zip(self.operands) {
+                *argument = *self.floats.view(*operand).block(index);
             }
-            let results = rows.map(&formula);
-            for (channel, out) in self.outs.iter_mut().enumerate() {
-                out[index].0 = std::array::from_fn(|lane| results[lane][channel]);
+            let mut results = [[0.0; LANES]; 4];
+            let [a, b, c, d, e, f, g, h] = &arguments;
+            for lane in 0..LANES {
+                let given = formula([a[lane], b[lane], c[lane], d[lane], e[lane], f[lane], g[lane], h[lane]]);
+                [results[0][lane], results[1][lane], results[2][lane], results[3][lane]] = given;
+            }
+            for (out, result) in self.outs.iter_mut().zip(results) {
+                out[index].0 = result;
             }
         }
     }

@@ -143,6 +143,7 @@ pub(in crate::shade) fn hsv_from_rgb(color: Vec3) -> Vec3 {
 
 /// For `n` = 0, 8 and 4 (red, green, blue), with `k = mod(n + hue * 12, 12)` and
 /// `a = saturation * min(lightness, 1 - lightness)`: `lightness - a * max(-1, min(min(k - 3, 9 - k), 1))`.
+#[inline(always)]
 pub(in crate::shade) fn rgb_from_hsl(hue: f32, saturation: f32, lightness: f32) -> Vec3 {
     let a = saturation * min(lightness, 1.0 - lightness);
     let channel = |n: f32| {
@@ -154,6 +155,7 @@ pub(in crate::shade) fn rgb_from_hsl(hue: f32, saturation: f32, lightness: f32) 
 
 /// The hue of `hsv_from_rgb`; with the greatest and the least channel, the lightness is `(greatest + least) * 0.5`, and
 /// the saturation `(greatest - lightness) / min(lightness, 1 - lightness)`, or 0 where that is 0.
+#[inline(always)]
 pub(in crate::shade) fn hsl_from_rgb(color: Vec3) -> Vec3 {
     let [r, g, b] = color.to_array();
     let greatest = max(max(r, g), b);
@@ -164,6 +166,7 @@ pub(in crate::shade) fn hsl_from_rgb(color: Vec3) -> Vec3 {
 }
 
 /// Rows of a matrix times a vector: `(row.x * v.x + row.y * v.y) + row.z * v.z`.
+#[inline(always)]
 fn times(rows: [[f32; 3]; 3], v: Vec3) -> Vec3 {
     let row = |[a, b, c]: [f32; 3]| a * v.x + b * v.y + c * v.z;
     Vec3::new(row(rows[0]), row(rows[1]), row(rows[2]))
@@ -189,6 +192,7 @@ const RGB_FROM_CONES: [[f32; 3]; 3] = [
 ];
 
 /// The matrix of the cones, the cube root of each, and the matrix to OKLab.
+#[inline(always)]
 pub(in crate::shade) fn oklab_from_rgb(color: Vec3) -> Vec3 {
     let cones = times(CONES_FROM_RGB, color);
     let roots = Vec3::new(portable::cbrt(cones.x), portable::cbrt(cones.y), portable::cbrt(cones.z));
@@ -196,6 +200,7 @@ pub(in crate::shade) fn oklab_from_rgb(color: Vec3) -> Vec3 {
 }
 
 /// The matrix from OKLab, `(root * root) * root` of each, and the matrix to RGB.
+#[inline(always)]
 pub(in crate::shade) fn rgb_from_oklab(lab: Vec3) -> Vec3 {
     let roots = times(ROOTS_FROM_OKLAB, lab);
     let cube = |root: f32| root * root * root;
@@ -204,6 +209,7 @@ pub(in crate::shade) fn rgb_from_oklab(lab: Vec3) -> Vec3 {
 
 /// With `(l, a, b)` of `oklab_from_rgb`: `(l, sqrt(a * a + b * b), fract(atan(b, a) / TAU))`; hue 0 where the chroma is
 /// below 0.00001, which is rounding.
+#[inline(always)]
 pub(in crate::shade) fn oklch_from_rgb(color: Vec3) -> Vec3 {
     let lab = oklab_from_rgb(color);
     let chroma = (lab.y * lab.y + lab.z * lab.z).sqrt();
@@ -212,12 +218,14 @@ pub(in crate::shade) fn oklch_from_rgb(color: Vec3) -> Vec3 {
 }
 
 /// `oklab(lightness, chroma * cos(hue * TAU), chroma * sin(hue * TAU))`.
+#[inline(always)]
 pub(in crate::shade) fn rgb_from_oklch(lch: Vec3) -> Vec3 {
     let angle = lch.z * TAU;
     rgb_from_oklab(Vec3::new(lch.x, lch.y * portable::cos(angle), lch.y * portable::sin(angle)))
 }
 
 /// `mix` of each component of the two colours in OKLab, as a colour.
+#[inline(always)]
 pub(in crate::shade) fn mix_oklab(a: Vec3, b: Vec3, t: f32) -> Vec3 {
     let (a, b) = (oklab_from_rgb(a), oklab_from_rgb(b));
     rgb_from_oklab(Vec3::new(mix(a.x, b.x, t), mix(a.y, b.y, t), mix(a.z, b.z, t)))

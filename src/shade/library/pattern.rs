@@ -95,6 +95,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
 /// With `w = saturate(width)`: without a filter, 1 where `abs(fract(x) - 0.5) * 2 < w`, else 0. With one, and with
 /// `i(t) = floor(t) * w + clamp(fract(t) - (0.5 - 0.5 * w), 0, w)`:
 /// `saturate((i(x + 0.5 * filter) - i(x - 0.5 * filter)) / filter)`.
+#[inline(always)]
 pub(in crate::shade) fn stripes(x: f32, width: f32, filter: f32) -> f32 {
     let w = saturate(width);
     if filter > 0.0 {
@@ -107,6 +108,7 @@ pub(in crate::shade) fn stripes(x: f32, width: f32, filter: f32) -> f32 {
 
 /// A square wave, 1 on the units that begin with an even number and −1 on the others; averaged over `filter`, with
 /// `i(t) = 1 - abs(mod(t, 2) - 1)`: `clamp((i(x + 0.5 * filter) - i(x - 0.5 * filter)) / filter, -1, 1)`.
+#[inline(always)]
 fn square_wave(x: f32, filter: f32) -> f32 {
     if filter > 0.0 {
         let integral = |t: f32| 1.0 - (floored_mod(t, 2.0) - 1.0).abs();
@@ -116,6 +118,7 @@ fn square_wave(x: f32, filter: f32) -> f32 {
 }
 
 /// `0.5 - 0.5 * wave(x) * wave(y)` (and `* wave(z)`), from left to right.
+#[inline(always)]
 pub(in crate::shade) fn checker(point: &[f32], filter: f32) -> f32 {
     let waves = point.iter().fold(0.5, |product, x| product * square_wave(*x, filter));
     0.5 - waves
@@ -124,6 +127,7 @@ pub(in crate::shade) fn checker(point: &[f32], filter: f32) -> f32 {
 /// With `d = length(fract(uv) - 0.5)`: without a filter, 1 where `d < radius`, else 0. With one, the mean
 /// `m = min(PI * radius * radius, 1)` takes over where the filter is wider than half a unit:
 /// `mix(saturate((radius - d) / filter + 0.5), m, saturate(filter * 2 - 1))`.
+#[inline(always)]
 pub(in crate::shade) fn dots(uv: Vec2, radius: f32, filter: f32) -> f32 {
     let d = length(Vec2::new(fract(uv.x) - 0.5, fract(uv.y) - 0.5));
     if filter > 0.0 {
@@ -134,12 +138,14 @@ pub(in crate::shade) fn dots(uv: Vec2, radius: f32, filter: f32) -> f32 {
 }
 
 /// `stripes(uv.y, darkness, filter)`.
+#[inline(always)]
 pub(in crate::shade) fn hatch(uv: Vec2, darkness: f32, filter: f32) -> f32 {
     stripes(uv.y, darkness, filter)
 }
 
 /// With `a = stripes(uv.y, min(d, 0.5), filter)` and `b = stripes(uv.x, max(d * 2 - 1, 0), filter)` for a darkness `d`
 /// within 0 … 1: `a + b - a * b`, which is the exact mean of the two layers, as they cross at right angles.
+#[inline(always)]
 pub(in crate::shade) fn cross_hatch(uv: Vec2, darkness: f32, filter: f32) -> f32 {
     let d = saturate(darkness);
     let a = stripes(uv.y, min(d, 0.5), filter);
@@ -148,6 +154,7 @@ pub(in crate::shade) fn cross_hatch(uv: Vec2, darkness: f32, filter: f32) -> f32
 }
 
 /// With `c = cos(radians)` and `s = sin(radians)`: `(v.x * c - v.y * s, v.x * s + v.y * c)`.
+#[inline(always)]
 pub(in crate::shade) fn rotate(v: Vec2, radians: f32) -> Vec2 {
     let (c, s) = (portable::cos(radians), portable::sin(radians));
     Vec2::new(v.x * c - v.y * s, v.x * s + v.y * c)
