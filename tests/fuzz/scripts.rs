@@ -105,7 +105,7 @@ impl Writer<'_> {
         let count = 2 + self.choose(7);
         let body = self.statements(count, 3);
         let end = self.outputs();
-        let _ = write!(text, "fn surface(hit, p) {{ let out = #{{}}; {first} {body} {end} }}\n");
+        let _ = writeln!(text, "fn surface(hit, p) {{ let out = #{{}}; {first} {body} {end} }}");
         text
     }
 
