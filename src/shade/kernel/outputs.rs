@@ -87,9 +87,16 @@ fn fill<T: Copy, S: Copy, const CHANNELS: usize>(
             let mut left = rows;
             for block in 0..rows.div_ceil(LANES) {
                 let (present, channels) = (present.lanes(block), channels.map(|channel| channel.lanes(block)));
-                let values: [T; LANES] = std::array::from_fn(|lane| {
-                    if present[lane] != 0 { make(channels.map(|channel| channel[lane])) } else { absent }
-                });
+                let mut values = [absent; LANES];
+                for lane in 0..LANES {
+                    let mut of_lane = [channels[0][0]; CHANNELS];
+                    for (value, channel) in of_lane.iter_mut().zip(channels) {
+                        *value = channel[lane];
+                    }
+                    if present[lane] != 0 {
+                        values[lane] = make(of_lane);
+                    }
+                }
                 column.extend_from_slice(&values[..left.min(LANES)]);
                 left = left.saturating_sub(LANES);
             }

@@ -673,16 +673,23 @@ impl Registers {
         if !lights.is_empty() {
             for block in 0..chunk.blocks() {
                 let index = index_of.block(block);
-                let samples: [&LightSample; LANES] = std::array::from_fn(|lane| {
-                    &lights[(block * LANES + lane).min(chunk.rows - 1) * count + in_range(index[lane])]
-                });
-                outs[0][block].0 = samples.map(|sample| sample.direction.x);
-                outs[1][block].0 = samples.map(|sample| sample.direction.y);
-                outs[2][block].0 = samples.map(|sample| sample.direction.z);
-                outs[3][block].0 = samples.map(|sample| sample.radiance.x);
-                outs[4][block].0 = samples.map(|sample| sample.radiance.y);
-                outs[5][block].0 = samples.map(|sample| sample.radiance.z);
-                outs[6][block].0 = samples.map(|sample| sample.visibility);
+                let same = index_of.uniform().map(in_range);
+                let mut columns = [[0.0; LANES]; 7];
+                for lane in 0..LANES {
+                    let row = (block * LANES + lane).min(chunk.rows - 1);
+                    let light = same.unwrap_or_else(|| in_range(index[lane]));
+                    let LightSample { direction, radiance, visibility } = lights[row * count + light];
+                    columns[0][lane] = direction.x;
+                    columns[1][lane] = direction.y;
+                    columns[2][lane] = direction.z;
+                    columns[3][lane] = radiance.x;
+                    columns[4][lane] = radiance.y;
+                    columns[5][lane] = radiance.z;
+                    columns[6][lane] = visibility;
+                }
+                for (out, column) in outs.iter_mut().zip(columns) {
+                    out[block].0 = column;
+                }
             }
         }
         for (register, out) in results.iter().zip(outs) {
@@ -700,25 +707,21 @@ impl Registers {
         let lights = hits.lights.get(rows.start * count..rows.end * count).unwrap_or_default();
         let normals = hits.normal.get(rows).unwrap_or_default();
         for block in 0..chunk.blocks() {
-            let row = |lane: usize| (block * LANES + lane).min(chunk.rows - 1);
-            let mut sums = [[0.0; LANES]; 3];
+            let [mut red, mut green, mut blue] = [[0.0; LANES]; 3];
             if !normals.is_empty() && !lights.is_empty() {
-                let normals: [Vec3; LANES] = std::array::from_fn(|lane| normals[row(lane)]);
                 for light in 0..count {
-                    let samples: [&LightSample; LANES] = std::array::from_fn(|lane| &lights[row(lane) * count + light]);
-                    let facing: [f32; LANES] =
-                        std::array::from_fn(|lane| hit::facing(normals[lane], samples[lane].direction));
-                    let shares: [f32; LANES] = samples.map(|sample| sample.visibility);
-                    for (channel, sums) in sums.iter_mut().enumerate() {
-                        let radiance: [f32; LANES] = samples.map(|sample| sample.radiance[channel]);
-                        for lane in 0..LANES {
-                            sums[lane] += radiance[lane] * shares[lane] * facing[lane];
-                        }
+                    for lane in 0..LANES {
+                        let row = (block * LANES + lane).min(chunk.rows - 1);
+                        let LightSample { direction, radiance, visibility } = lights[row * count + light];
+                        let facing = hit::facing(normals[row], direction);
+                        red[lane] += radiance.x * visibility * facing;
+                        green[lane] += radiance.y * visibility * facing;
+                        blue[lane] += radiance.z * visibility * facing;
                     }
                 }
             }
-            for (out, sums) in outs.iter_mut().zip(sums) {
-                out[block].0 = sums;
+            for (out, channel) in outs.iter_mut().zip([red, green, blue]) {
+                out[block].0 = channel;
             }
         }
         for (register, out) in results.iter().zip(outs) {
