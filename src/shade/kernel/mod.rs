@@ -117,6 +117,14 @@ impl Kernel {
                 let output = &self.lowered.outputs[*output];
                 outputs::append(&output.target, aovs, &slice.program.roots[*root - 1..], registers, rows, outputs);
             }
+            // A layer that the plan does not know is a fault of the hits that write it.
+            for (output, root) in &slice.outputs {
+                if let Target::Aov(name) = &self.lowered.outputs[*output].target
+                    && aovs.binary_search(name).is_err()
+                {
+                    registers.fail(slice.program.roots[*root - 1], rows.div_ceil(run::LANES));
+                }
+            }
             if registers.any_failed() {
                 failed.extend((0..rows).filter(|row| registers.has_failed(*row)).map(|row| first + row));
             }

@@ -119,7 +119,8 @@ impl Registers {
         (0..blocks).any(|index| view.block(index).iter().fold(0, |any, lane| any | lane) != 0)
     }
 
-    fn fail(&mut self, register: Register, blocks: usize) {
+    /// Hits in a mask fail.
+    pub(super) fn fail(&mut self, register: Register, blocks: usize) {
         let view = self.bools.view(register);
         for (index, failed) in self.failed[..blocks].iter_mut().enumerate() {
             for (failed, lane) in failed.0.iter_mut().zip(view.block(index)) {
