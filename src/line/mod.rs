@@ -25,6 +25,8 @@ pub use differ::Fired;
 pub use rules::Rules;
 pub use window::{LineTile, Window};
 
+pub use crate::scene::settings::LineType;
+
 use crate::sample::{NodePath, PixelRect};
 use pair::LineNode;
 use window::PathTile;
@@ -41,23 +43,6 @@ pub enum Method {
     Choudhury,
     /// Bauer 2017: one style, a contour image of sub-pixels; camera nodes only.
     Bauer,
-}
-
-/// What kind of feature a line marks (DESIGN section 3.6), by the strongest reason, in this order.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum LineType {
-    /// One side is a miss.
-    Outline,
-    /// The objects differ.
-    Silhouette,
-    /// The materials differ.
-    Material,
-    /// The normals differ.
-    Crease,
-    /// The texture coordinates differ.
-    Uv,
-    /// The feature colours differ.
-    Feature,
 }
 
 /// The line that a sample sees. With [`Rules::with_any_pair`], `fired`, `neighbor` and `own` may be those of another pair

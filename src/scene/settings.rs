@@ -97,6 +97,41 @@ bitflags! {
     }
 }
 
+/// What kind of feature a line marks (DESIGN section 3.6), by the strongest reason, in this order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum LineType {
+    /// One side is a miss.
+    Outline,
+    /// The objects differ.
+    Silhouette,
+    /// The materials differ.
+    Material,
+    /// The normals differ.
+    Crease,
+    /// The texture coordinates differ.
+    Uv,
+    /// The feature colours differ.
+    Feature,
+}
+
+impl LineType {
+    /// All of them, the strongest reason first.
+    pub const ALL: [Self; 6] = [Self::Outline, Self::Silhouette, Self::Material, Self::Crease, Self::Uv, Self::Feature];
+
+    /// As layers, scene files and scripts call it.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Outline => "outline",
+            Self::Silhouette => "silhouette",
+            Self::Material => "material",
+            Self::Crease => "crease",
+            Self::Uv => "uv",
+            Self::Feature => "feature",
+        }
+    }
+}
+
 /// How a line at a reflected or refracted node enters the sample's colour.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Composition {
