@@ -6,14 +6,17 @@
 //! size, threads and method change no bit.
 //!
 //! `brute` is the definition as plain loops and the oracle for `search`, which gives the same bits much sooner. What
-//! decides is shared by both: `differ`, `pair`, [`Rules`]. `bounds` and `lanes` are the search's: what is known of many nodes
+//! decides is shared by both: `differ`, `overlap`, `materials`, `pair`, [`Rules`]. `bounds` and `lanes` are the search's: what is known of many nodes
 //! at once, and the loops over neighbours that are left.
 
 mod baselines;
 mod bounds;
 mod brute;
 mod differ;
+mod inspect;
 mod lanes;
+mod materials;
+mod overlap;
 mod pair;
 mod rules;
 mod search;
@@ -22,6 +25,7 @@ mod window;
 
 pub use bounds::TileBounds;
 pub use differ::Fired;
+pub use inspect::{InspectedPair, TestResult, inspect, nearest_difference};
 pub use rules::Rules;
 pub use window::{LineTile, Window};
 
@@ -50,6 +54,8 @@ pub enum LineType {
     Outline,
     /// The objects differ.
     Silhouette,
+    /// The object folds over itself.
+    Overlap,
     /// The materials differ.
     Material,
     /// The normals differ.
@@ -58,6 +64,22 @@ pub enum LineType {
     Uv,
     /// The feature colours differ.
     Feature,
+}
+
+impl LineType {
+    /// As in the layer `line.TYPE`.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Outline => "outline",
+            Self::Silhouette => "silhouette",
+            Self::Overlap => "overlap",
+            Self::Material => "material",
+            Self::Crease => "crease",
+            Self::Uv => "uv",
+            Self::Feature => "feature",
+        }
+    }
 }
 
 /// The line that a sample sees. With [`Rules::with_any_pair`], `fired`, `neighbor` and `own` may be those of another pair
