@@ -1,6 +1,6 @@
 //! The definition as plain loops (DESIGN section 3.2), to be read beside the text. The oracle of [`super::search`].
 
-use super::pair::{Found, MOST_LINES, Pair, Taken, distance_squared};
+use super::pair::{Found, MOST_LINES, Pair, Taken, distance_squared, fired};
 use super::window::{PathTile, PathWindow};
 use super::{LineCounts, Rules};
 use crate::sample::PixelRect;
@@ -49,6 +49,7 @@ fn seen(
     counts: &mut LineCounts,
 ) -> Option<Pair> {
     let [x, y] = targets.buffer.pixel_of(targets.nodes.rows.sample(row));
+    let target = row;
     let t = targets.node([x, y], row);
     let mut seen: Option<Pair> = None;
 
@@ -60,8 +61,8 @@ fn seen(
                 let n = tile.node(pixel, row);
                 counts.pairs_tested += 1;
 
-                // … with differ(t, n):
-                if !rules.tests().differ(&t.features, &n.features) {
+                // … with differ(t, n), as the material of the priority sample tests:
+                if fired(rules, (targets, target, &t), (tile, row, &n)).is_empty() {
                     continue;
                 }
                 // the priority sample p: the larger explicit priority, else the shorter depth, else t.

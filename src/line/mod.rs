@@ -6,14 +6,17 @@
 //! size, threads and method change no bit.
 //!
 //! `brute` is the definition as plain loops and the oracle for `search`, which gives the same bits much sooner. What
-//! decides is shared by both: `differ`, `pair`, [`Rules`]. `bounds` and `lanes` are the search's: what is known of many nodes
+//! decides is shared by both: `differ`, `overlap`, `materials`, `pair`, [`Rules`]. `bounds` and `lanes` are the search's: what is known of many nodes
 //! at once, and the loops over neighbours that are left.
 
 mod baselines;
 mod bounds;
 mod brute;
 mod differ;
+mod inspect;
 mod lanes;
+mod materials;
+mod overlap;
 mod pair;
 mod rules;
 mod search;
@@ -22,6 +25,7 @@ mod window;
 
 pub use bounds::TileBounds;
 pub use differ::Fired;
+pub use inspect::{InspectedPair, TestResult, inspect, nearest_difference};
 pub use rules::Rules;
 pub use window::{LineTile, Window};
 

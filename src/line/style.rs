@@ -1,8 +1,8 @@
 //! How a seen line colours its sample (DESIGN sections 3.2 and 3.3; OG18 sections 3.4 and 3.5).
 
 use super::differ::Fired;
-use super::pair::Found;
-use super::window::{PathTile, PathWindow, features};
+use super::pair::{Found, fired};
+use super::window::{PathTile, PathWindow};
 use super::{LineType, Rules, SeenLine};
 use crate::math::{Vec3, luminance};
 use crate::scene::settings::Composition;
@@ -14,6 +14,7 @@ impl LineType {
         [
             (Fired::MISS, Self::Outline),
             (Fired::OBJECT, Self::Silhouette),
+            (Fired::OVERLAP, Self::Overlap),
             (Fired::SHADER, Self::Material),
             (Fired::NORMAL, Self::Crease),
             (Fired::UV, Self::Uv),
@@ -61,12 +62,15 @@ pub(super) fn style(window: &PathWindow<'_>, targets: &PathTile<'_>, found: &Fou
     let pair = &found.pair;
     let neighbors = window.tiles[pair.tile as usize].as_ref()?;
     let spp = neighbors.buffer.samples_per_pixel;
+    let target = targets.node(targets.buffer.pixel_of(sample), found.row);
+    let row = pair.row as usize;
+    let neighbor = neighbors.node(pair.pixel, row);
     Some(SeenLine {
         color: color.to_array(),
         alpha: covered,
         lined: lined.to_array(),
         path: found.path,
-        fired: rules.tests().fired(&features(targets.nodes, found.row), &features(neighbors.nodes, pair.row as usize)),
+        fired: fired(rules, (targets, found.row, &target), (neighbors, row, &neighbor)),
         neighbor: (pair.pixel, neighbors.nodes.rows.sample(pair.row as usize) % spp),
         own: pair.own,
     })

@@ -104,6 +104,8 @@ pub enum LineType {
     Outline,
     /// The objects differ.
     Silhouette,
+    /// The object folds over itself.
+    Overlap,
     /// The materials differ.
     Material,
     /// The normals differ.
@@ -124,6 +126,7 @@ impl LineType {
         match self {
             Self::Outline => "outline",
             Self::Silhouette => "silhouette",
+            Self::Overlap => "overlap",
             Self::Material => "material",
             Self::Crease => "crease",
             Self::Uv => "uv",
@@ -166,6 +169,8 @@ pub struct LineSettings {
     pub normal: Option<f32>,
     /// Where any channel of the feature colours differs by more than this.
     pub feature: Option<f32>,
+    /// Where an object folds over itself by more than this many pixels per pixel of the picture.
+    pub overlap: Option<f32>,
     /// Which paths draw lines; `SHADOW` is not among them.
     pub paths: RayKinds,
     /// Whether lines in reflections and refractions take the path's throughput as tint.
@@ -188,9 +193,58 @@ impl Default for LineSettings {
             uv: None,
             normal: None,
             feature: None,
+            overlap: None,
             paths: RayKinds::CAMERA.union(RayKinds::REFLECTION).union(RayKinds::REFRACTION),
             tint: true,
             compose: Composition::Replace,
+        }
+    }
+}
+
+impl LineSettings {
+    /// Whether any test is on.
+    #[must_use]
+    pub fn tests_anything(&self) -> bool {
+        self.object
+            || self.shader
+            || self.uv.is_some()
+            || self.normal.is_some()
+            || self.feature.is_some()
+            || self.overlap.is_some()
+    }
+}
+
+/// `[materials.NAME.lines]`: what a material changes about the tests of `[lines]`; `None` leaves it. A pair of samples is
+/// tested as the material of the one whose line attributes style the line says (DESIGN section 3.2: the larger priority,
+/// else the shorter depth, else the target).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct LineOverrides {
+    /// [`LineSettings::object`].
+    pub object: Option<bool>,
+    /// [`LineSettings::shader`].
+    pub shader: Option<bool>,
+    /// [`LineSettings::uv`]; `Some(None)` is off.
+    pub uv: Option<Option<f32>>,
+    /// [`LineSettings::normal`]; `Some(None)` is off.
+    pub normal: Option<Option<f32>>,
+    /// [`LineSettings::feature`]; `Some(None)` is off.
+    pub feature: Option<Option<f32>>,
+    /// [`LineSettings::overlap`]; `Some(None)` is off.
+    pub overlap: Option<Option<f32>>,
+}
+
+impl LineOverrides {
+    /// The settings with these changes.
+    #[must_use]
+    pub fn over(&self, settings: &LineSettings) -> LineSettings {
+        LineSettings {
+            object: self.object.unwrap_or(settings.object),
+            shader: self.shader.unwrap_or(settings.shader),
+            uv: self.uv.unwrap_or(settings.uv),
+            normal: self.normal.unwrap_or(settings.normal),
+            feature: self.feature.unwrap_or(settings.feature),
+            overlap: self.overlap.unwrap_or(settings.overlap),
+            ..settings.clone()
         }
     }
 }

@@ -184,6 +184,7 @@ pub fn scene(script: &str) -> Scene {
         params,
         priority: None,
         double_sided: true,
+        lines: Default::default(),
         span: None,
     });
     builder.build().unwrap_or_else(|faults| panic!("{faults}"))

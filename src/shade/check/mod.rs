@@ -105,6 +105,7 @@ fn scene_of(source: &Arc<Source>) -> Result<(Scene, MaterialId), Diagnostics> {
         params: BTreeMap::new(),
         priority: None,
         double_sided: true,
+        lines: Default::default(),
         span: None,
     });
     Ok((scene.build()?, material))

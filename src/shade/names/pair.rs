@@ -109,7 +109,7 @@ pub const PAIR_INPUTS: [PairInput; 14] = [
         input: PairSet::KIND,
         of_side: false,
         unit: "",
-        range: "`\"outline\"`, `\"silhouette\"`, `\"material\"`, `\"crease\"`, `\"uv\"`, `\"feature\"`",
+        range: "`\"outline\"`, `\"silhouette\"`, `\"overlap\"`, `\"material\"`, `\"crease\"`, `\"uv\"`, `\"feature\"`",
         about: "what the line marks, by the strongest reason",
         form: PairForm::Word(&KINDS),
     },

@@ -6,7 +6,9 @@ use super::{Resolver, rgb};
 use crate::diag::Diagnostic;
 use crate::math::Vec3;
 use crate::scene::check::MAX_PIXELS;
-use crate::scene::settings::{Background, Composition, FilterKind, LineSettings, RayKinds, RenderSettings};
+use crate::scene::settings::{
+    Background, Composition, FilterKind, LineOverrides, LineSettings, RayKinds, RenderSettings,
+};
 use crate::scene::texture::{Texture, TextureFilter, Wrap};
 
 impl Resolver<'_> {
@@ -76,14 +78,7 @@ impl Resolver<'_> {
             let fault = Diagnostic::error("surface lists are not built yet: `surfaces` can only be 1");
             self.faults.push(fault.at(node.span_of("surfaces")));
         }
-        if let format::Threshold::Above(degrees) = lines.normal
-            && degrees > 180.0
-        {
-            self.fault(
-                format!("`lines.normal` is an angle of at most 180 degrees, found {degrees}"),
-                node.span_of("normal"),
-            );
-        }
+        self.check_angle(lines.normal, "lines.normal", node);
         if lines.min_width > lines.max_width {
             let message = format!("`min_width` is {} and `max_width` only {}", lines.min_width, lines.max_width);
             self.fault(message, node.span_of("min_width"));
@@ -98,10 +93,6 @@ impl Resolver<'_> {
             format::LinePath::Reflection => RayKinds::REFLECTION,
             format::LinePath::Refraction => RayKinds::REFRACTION,
         });
-        let threshold = |threshold| match threshold {
-            format::Threshold::Off(_) => None,
-            format::Threshold::Above(value) => Some(value as f32),
-        };
         self.scene.lines = LineSettings {
             enabled: true,
             color: rgb(lines.color),
@@ -114,6 +105,7 @@ impl Resolver<'_> {
             uv: threshold(lines.uv),
             normal: threshold(lines.normal),
             feature: threshold(lines.feature),
+            overlap: threshold(lines.overlap),
             paths: paths.fold(RayKinds::empty(), RayKinds::union),
             tint: lines.tint,
             compose: match lines.compose {
@@ -121,5 +113,36 @@ impl Resolver<'_> {
                 format::Compose::Throughput => Composition::Throughput,
             },
         };
+    }
+
+    /// What a material changes about the line tests; `path` names it in messages.
+    pub(super) fn line_overrides(&mut self, lines: &format::MaterialLines, path: &str, node: &Node) -> LineOverrides {
+        if let Some(normal) = lines.normal {
+            self.check_angle(normal, &format!("{path}.normal"), node);
+        }
+        LineOverrides {
+            object: lines.object,
+            shader: lines.shader,
+            uv: lines.uv.map(threshold),
+            normal: lines.normal.map(threshold),
+            feature: lines.feature.map(threshold),
+            overlap: lines.overlap.map(threshold),
+        }
+    }
+
+    fn check_angle(&mut self, normal: format::Threshold, path: &str, node: &Node) {
+        if let format::Threshold::Above(degrees) = normal
+            && degrees > 180.0
+        {
+            let message = format!("`{path}` is an angle of at most 180 degrees, found {degrees}");
+            self.fault(message, node.span_of("normal"));
+        }
+    }
+}
+
+fn threshold(threshold: format::Threshold) -> Option<f32> {
+    match threshold {
+        format::Threshold::Off(_) => None,
+        format::Threshold::Above(value) => Some(value as f32),
     }
 }
