@@ -105,9 +105,8 @@ mod tests {
         for bits in 0..128 {
             let fired = Fired::from_bits_truncate(bits);
             let miss = fired.contains(Fired::MISS);
-            if miss && fired.intersects(Fired::NORMAL | Fired::UV | Fired::FEATURE | Fired::OVERLAP)
-                || miss && !fired.intersects(Fired::OBJECT | Fired::SHADER)
-            {
+            let of_hits = Fired::NORMAL | Fired::UV | Fired::FEATURE | Fired::OVERLAP;
+            if miss && (fired.intersects(of_hits) || !fired.intersects(Fired::OBJECT | Fired::SHADER)) {
                 continue;
             }
             let reasons = LaneReasons {
