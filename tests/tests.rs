@@ -21,3 +21,4 @@ mod trace;
 // ... and the whole.
 mod same_bits;
 mod truth;
+mod why;

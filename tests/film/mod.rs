@@ -50,6 +50,7 @@ impl Samples {
                 let tests = [
                     Fired::MISS | Fired::OBJECT,
                     Fired::OBJECT,
+                    Fired::OVERLAP,
                     Fired::SHADER,
                     Fired::NORMAL,
                     Fired::UV,

@@ -1,8 +1,11 @@
 //! The line pass: oracle against text, search against oracle, both against areas that are known.
 
 mod area;
+mod bad_input;
 mod baselines;
 mod buffer;
 mod equal;
+mod objects;
+mod overlap;
 pub mod picture;
 mod seen;

@@ -215,6 +215,7 @@ fn the_strongest_reason_names_the_line() {
     let order = [
         (Fired::MISS, LineType::Outline),
         (Fired::OBJECT, LineType::Silhouette),
+        (Fired::OVERLAP, LineType::Overlap),
         (Fired::SHADER, LineType::Material),
         (Fired::NORMAL, LineType::Crease),
         (Fired::UV, LineType::Uv),

@@ -79,11 +79,16 @@ impl Resolver<'_> {
             self.faults.push(fault.at(node.span_of("surfaces")));
         }
         self.check_angle(lines.normal, "lines.normal", node);
-        if lines.min_width > lines.max_width {
+        if lines.max_width == 0.0 {
+            if lines.width > 0.0 {
+                let warning = Diagnostic::warning("no lines are drawn: `max_width` is 0");
+                self.faults.push(warning.at(node.span_of("max_width")));
+            }
+        } else if lines.min_width > lines.max_width {
             let message = format!("`min_width` is {} and `max_width` only {}", lines.min_width, lines.max_width);
             self.fault(message, node.span_of("min_width"));
         }
-        if lines.width > lines.max_width {
+        if lines.width > lines.max_width && lines.max_width > 0.0 {
             let message = format!("lines are drawn {} pixels wide, as `max_width` says", lines.max_width);
             let warning = Diagnostic::warning(message).at(node.span_of("width"));
             self.faults.push(warning.hint(format!("set `max_width = {}`, too", lines.width)));
