@@ -113,26 +113,39 @@ impl Tiles {
     }
 }
 
-/// The area that lines cover in a rectangle, in square pixels: the mean of their alpha over the samples. Samples are
-/// taken beyond it too, so its border does not matter.
+/// The part of each pixel of a rectangle that lines cover, row by row: the mean of their alpha over its samples. Samples
+/// are taken beyond it too, so its border does not matter.
+#[allow(dead_code, reason = "the benchmark does not ask")]
+pub fn covered_by_pixel(
+    rect: PixelRect,
+    settings: &LineSettings,
+    samples_per_pixel: u32,
+    node: &dyn Fn([f32; 2]) -> Node,
+) -> Vec<f64> {
+    let rules = Rules::new(settings, samples_per_pixel);
+    let layout = layout(samples_per_pixel, settings.max_width);
+    let sampled_rect = rect.grown(rules.reach());
+    let tiles = Tiles::new(sampled_rect, 32, &rules, |tile| sampled(tile, &layout, node));
+    let mut covered = vec![0.0; rect.pixels()];
+    for ((buffer, _), lines) in tiles.tiles.iter().zip(tiles.lines(Method::Exact)) {
+        for (&sample, line) in lines.samples.iter().zip(&lines.lines) {
+            let [x, y] = buffer.pixel_of(sample);
+            if rect.contains(x, y) {
+                let pixel = (y - rect.y0) as usize * rect.width() as usize + (x - rect.x0) as usize;
+                covered[pixel] += f64::from(line.alpha) / f64::from(samples_per_pixel);
+            }
+        }
+    }
+    covered
+}
+
+/// The area that lines cover in a rectangle, in square pixels.
+#[allow(dead_code, reason = "the benchmark does not ask")]
 pub fn covered_area(
     rect: PixelRect,
     settings: &LineSettings,
     samples_per_pixel: u32,
     node: &dyn Fn([f32; 2]) -> Node,
 ) -> f64 {
-    let rules = Rules::new(settings, samples_per_pixel);
-    let layout = layout(samples_per_pixel, settings.max_width);
-    let sampled_rect = rect.grown(rules.reach());
-    let tiles = Tiles::new(sampled_rect, 32, &rules, |tile| sampled(tile, &layout, node));
-    let mut alpha = 0.0;
-    for ((buffer, _), lines) in tiles.tiles.iter().zip(tiles.lines(Method::Exact)) {
-        for (&sample, line) in lines.samples.iter().zip(&lines.lines) {
-            let [x, y] = buffer.pixel_of(sample);
-            if rect.contains(x, y) {
-                alpha += f64::from(line.alpha);
-            }
-        }
-    }
-    alpha / f64::from(samples_per_pixel)
+    covered_by_pixel(rect, settings, samples_per_pixel, node).iter().sum()
 }
