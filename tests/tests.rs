@@ -20,4 +20,5 @@ mod line;
 mod trace;
 // ... and the whole.
 mod same_bits;
+mod surfaces;
 mod truth;

@@ -95,6 +95,8 @@ pub(super) struct Pair {
     pub tile: u32,
     /// The neighbour's row in its tile.
     pub row: u32,
+    /// Which surface of the priority sample's list styles the line: 0 for the first.
+    pub surface: u32,
     /// Whether the target is the priority sample.
     pub own: bool,
 }
@@ -109,20 +111,23 @@ impl Pair {
         if self.distance_squared != other.distance_squared {
             return self.distance_squared < other.distance_squared;
         }
-        // Rows of a pixel are in the order of its samples.
-        let index = |pair: &Self| (pair.pixel[1], pair.pixel[0], pair.row);
+        // Rows of a pixel are in the order of its samples; the lines of one neighbour come
+        // before the target's own, in the order of its list.
+        let index = |pair: &Self| (pair.pixel[1], pair.pixel[0], pair.row, pair.own, pair.surface);
         index(self) < index(other)
     }
 }
 
 /// The line that a target sees, before styling.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) struct Found {
     /// The target's row at the path.
     pub row: usize,
     /// The path.
     pub path: NodePath,
     pub pair: Pair,
+    /// Whether it is the line of a hidden surface, in their style.
+    pub hidden: bool,
     /// What is seen through it, front to back, if it is not opaque.
     pub behind: Vec<Pair>,
 }

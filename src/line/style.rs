@@ -2,7 +2,7 @@
 
 use super::differ::Fired;
 use super::pair::Found;
-use super::window::{PathTile, PathWindow, features};
+use super::window::{PathTile, PathWindow, alpha, features};
 use super::{LineType, Rules, SeenLine};
 use crate::math::{Vec3, luminance};
 use crate::scene::settings::Composition;
@@ -36,11 +36,13 @@ pub(super) fn style(window: &PathWindow<'_>, targets: &PathTile<'_>, found: &Fou
     let (mut lined, mut color, mut premultiplied, mut covered) = (before, Vec3::ZERO, Vec3::ZERO, 0.0);
     for pair in found.behind.iter().rev().chain([&found.pair]) {
         let (nodes, row) = match pair.own {
-            true => (targets, found.row),
-            false => (window.tiles[pair.tile as usize].as_ref()?, pair.row as usize),
+            true => targets.surface(found.row, pair.surface)?,
+            false => window.tiles[pair.tile as usize].as_ref()?.surface(pair.row as usize, pair.surface)?,
         };
-        let line_color = Vec3::from(nodes.nodes.line_color.get(row));
-        let alpha = nodes.alpha(row, rules);
+        let (line_color, alpha) = match rules.hidden().filter(|_| found.hidden) {
+            Some(hidden) => (Vec3::from(hidden.color), hidden.alpha),
+            None => (Vec3::from(nodes.line_color.get(row)), alpha(nodes, row, rules)),
+        };
         color = if settings.tint { line_color * throughput } else { line_color };
         match settings.compose {
             Composition::Replace => lined = lined * (1.0 - alpha) + color * alpha,
@@ -61,12 +63,17 @@ pub(super) fn style(window: &PathWindow<'_>, targets: &PathTile<'_>, found: &Fou
     let pair = &found.pair;
     let neighbors = window.tiles[pair.tile as usize].as_ref()?;
     let spp = neighbors.buffer.samples_per_pixel;
+    // The two sides: the surface that styles the line, and the first surface of the other sample.
+    let (mine, theirs) = if pair.own { (pair.surface, 0) } else { (0, pair.surface) };
+    let (mine, my_row) = targets.surface(found.row, mine)?;
+    let (theirs, their_row) = neighbors.surface(pair.row as usize, theirs)?;
     Some(SeenLine {
         color: color.to_array(),
         alpha: covered,
         lined: lined.to_array(),
         path: found.path,
-        fired: rules.tests().fired(&features(targets.nodes, found.row), &features(neighbors.nodes, pair.row as usize)),
+        hidden: found.hidden,
+        fired: rules.tests().fired(&features(mine, my_row), &features(theirs, their_row)),
         neighbor: (pair.pixel, neighbors.nodes.rows.sample(pair.row as usize) % spp),
         own: pair.own,
     })

@@ -144,7 +144,15 @@ impl<'a> PathTile<'a> {
 
     /// How much the line of a row covers, 0 … 1.
     pub(super) fn alpha(&self, row: usize, rules: &Rules) -> f32 {
-        rules.alpha(self.nodes.line_width.get(row)) * self.nodes.line_opacity.get(row)
+        alpha(self.nodes, row, rules)
+    }
+
+    /// Where the surface at a place of a row's list is kept: its columns and its row there.
+    pub(super) fn surface(&self, row: usize, place: u32) -> Option<(&'a NodeColumns, usize)> {
+        let Some(behind) = (place as usize).checked_sub(1) else { return Some((self.nodes, row)) };
+        let behind = self.nodes.behind.get(behind)?;
+        let sample = self.nodes.rows.sample(row);
+        Some((behind, behind.row_of((sample / self.buffer.samples_per_pixel) as usize, sample)?))
     }
 
     #[inline(always)]
@@ -170,6 +178,11 @@ impl LineStyle {
     pub(super) fn is_opaque(&self, rules: &Rules) -> bool {
         rules.alpha(self.width) * self.opacity >= 1.0
     }
+}
+
+/// How much the line of a row covers, 0 … 1.
+pub(super) fn alpha(nodes: &NodeColumns, row: usize, rules: &Rules) -> f32 {
+    rules.alpha(nodes.line_width.get(row)) * nodes.line_opacity.get(row)
 }
 
 /// The style of a row.

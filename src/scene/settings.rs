@@ -2,7 +2,7 @@
 
 use bitflags::bitflags;
 
-use super::ids::TextureId;
+use super::ids::{ObjectId, TextureId};
 use crate::math::Vec3;
 
 /// A reconstruction filter's shape; its radius stands beside it.
@@ -137,6 +137,21 @@ pub struct LineSettings {
     pub tint: bool,
     /// How they enter the sample.
     pub compose: Composition,
+    /// How many surfaces a ray's list holds at most (DESIGN section 3.4), at least 1.
+    pub surfaces: u32,
+    /// How lines of surfaces behind the first are drawn; `None` if they are not. Needs `surfaces` above 1.
+    pub hidden: Option<HiddenLines>,
+}
+
+/// `[lines.hidden]`: one style for all lines of surfaces behind the first.
+#[derive(Clone, Debug, PartialEq)]
+pub struct HiddenLines {
+    /// Linear.
+    pub color: Vec3,
+    /// Full width in pixels; 0 is no line.
+    pub width: f32,
+    /// The objects whose hidden lines are drawn, rising; `None` for all.
+    pub objects: Option<Vec<ObjectId>>,
 }
 
 impl Default for LineSettings {
@@ -156,6 +171,8 @@ impl Default for LineSettings {
             paths: RayKinds::CAMERA.union(RayKinds::REFLECTION).union(RayKinds::REFRACTION),
             tint: true,
             compose: Composition::Replace,
+            surfaces: 1,
+            hidden: None,
         }
     }
 }

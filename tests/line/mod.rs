@@ -4,5 +4,6 @@ mod area;
 mod baselines;
 mod buffer;
 mod equal;
+mod lists;
 pub mod picture;
 mod seen;

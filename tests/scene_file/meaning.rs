@@ -7,9 +7,12 @@ use proptest::prelude::*;
 use tusche::math::{DVec3, Vec2, Vec3, Vec4};
 use tusche::scene::camera::Projection;
 use tusche::scene::file::{LoadOptions, load};
+use tusche::scene::ids::ObjectId;
 use tusche::scene::light::LightKind;
 use tusche::scene::material::ParamValue;
-use tusche::scene::settings::{Background, Composition, FilterKind, LineSettings, RayKinds, RenderSettings};
+use tusche::scene::settings::{
+    Background, Composition, FilterKind, HiddenLines, LineSettings, RayKinds, RenderSettings,
+};
 use tusche::scene::shape::Shape;
 use tusche::scene::texture::{Pixels, TextureFilter, Wrap};
 
@@ -62,6 +65,12 @@ fn every_setting_is_taken_over() {
             paths: RayKinds::CAMERA | RayKinds::REFRACTION,
             tint: false,
             compose: Composition::Throughput,
+            surfaces: 3,
+            hidden: Some(HiddenLines {
+                color: Vec3::new(0.2, 0.3, 0.4),
+                width: 0.75,
+                objects: Some(vec![ObjectId(0)]),
+            }),
         }
     );
     scene.build().unwrap();
