@@ -56,6 +56,8 @@ struct Sight {
     others: bool,
     /// Whether they may see their own.
     own: bool,
+    /// The widest line's, of those that the targets do not draw themselves.
+    radius_squared: f32,
     /// The style of the neighbours' lines.
     style: Styles,
 }
@@ -160,7 +162,7 @@ impl<'w, 'a> Scratch<'w, 'a> {
         let rules = self.search.rules;
         let tests = rules.tests();
         let t1 = t.first();
-        let mut sight = Sight { best: Rank::LAST, others: false, own: false, style: Styles::None };
+        let mut sight = Sight { best: Rank::LAST, others: false, own: false, radius_squared: 0.0, style: Styles::None };
         match self.search.kind {
             Kind::Visible => {
                 let n1 = n.first();
@@ -173,6 +175,7 @@ impl<'w, 'a> Scratch<'w, 'a> {
                     {
                         sight.others = true;
                         sight.best = sight.best.better(s.bounds.best);
+                        sight.radius_squared = sight.radius_squared.max(s.bounds.radius_squared);
                         if self.any_pair {
                             sight.style = sight.style.and(styles(tile, place, s.bounds.stylist));
                         }
@@ -187,6 +190,7 @@ impl<'w, 'a> Scratch<'w, 'a> {
                 if gap_squared >= radius_squared {
                     return None;
                 }
+                sight.radius_squared = radius_squared;
                 for place in 0..n.places() {
                     let Some((s, _)) = n.at(place) else { continue };
                     if s.bounds.radius_squared > 0.0
@@ -307,24 +311,27 @@ impl<'w, 'a> Scratch<'w, 'a> {
             targets.iter_mut().for_each(|target| target.settled = target.best.is_some());
         }
         for next in 0..self.candidates.len() {
-            let Candidate { gap_squared, sight, .. } = self.candidates[next];
+            let Candidate { tile, place, sight, .. } = self.candidates[next];
             if !sight.others {
                 continue;
             }
+            let pixel = tile.bounds.pixels[place].pixel;
             let open = |target: &Target| {
-                !target.settled
-                    && sight.best.outranks(target.node.rank)
-                    && target.best.is_none_or(|best| {
-                        !best.rank.outranks(sight.best)
-                            && (best.rank != sight.best || best.distance_squared >= gap_squared)
-                    })
+                if target.settled
+                    || !sight.best.outranks(target.node.rank)
+                    || target.best.is_some_and(|best| best.rank.outranks(sight.best))
+                {
+                    return false;
+                }
+                let gap_squared = gap_squared(&target.node, pixel);
+                gap_squared < sight.radius_squared
+                    && target.best.is_none_or(|best| best.rank != sight.best || best.distance_squared >= gap_squared)
             };
             if !targets.iter().any(open) {
                 continue;
             }
             let (first, end) = self.gathered(next);
-            let Candidate { index, tile, place, .. } = self.candidates[next];
-            let pixel = tile.bounds.pixels[place].pixel;
+            let index = self.candidates[next].index;
             for target in targets.iter_mut().filter(|target| open(target)) {
                 self.pairs_tested += u64::from(end - first);
                 for n in &self.neighbors[first as usize..end as usize] {
@@ -346,21 +353,24 @@ impl<'w, 'a> Scratch<'w, 'a> {
         let mut targets = std::mem::take(&mut self.targets);
         self.sort_candidates(true);
         for next in 0..self.candidates.len() {
-            let Candidate { gap_squared, sight, .. } = self.candidates[next];
+            let Candidate { tile, place, sight, .. } = self.candidates[next];
             if !sight.own {
                 continue;
             }
+            let pixel = tile.bounds.pixels[place].pixel;
             let open = |target: &Target| {
-                !target.settled
-                    && gap_squared < target.node.radius_squared
+                if target.settled {
+                    return false;
+                }
+                let gap_squared = gap_squared(&target.node, pixel);
+                gap_squared < target.node.radius_squared
                     && target.best.is_none_or(|best| best.distance_squared >= gap_squared)
             };
             if !targets.iter().any(open) {
                 continue;
             }
             let (first, end) = self.gathered(next);
-            let Candidate { index, tile, place, .. } = self.candidates[next];
-            let pixel = tile.bounds.pixels[place].pixel;
+            let index = self.candidates[next].index;
             for target in targets.iter_mut().filter(|target| open(target)) {
                 self.pairs_tested += u64::from(end - first);
                 for n in &self.neighbors[first as usize..end as usize] {
@@ -381,15 +391,18 @@ impl<'w, 'a> Scratch<'w, 'a> {
         let mut targets = std::mem::take(&mut self.targets);
         self.sort_candidates(self.any_pair);
         for next in 0..self.candidates.len() {
-            let best_here = self.candidates[next].sight.best;
-            let open =
-                |target: &Target| !target.settled && target.best.is_none_or(|best| !best.rank.outranks(best_here));
+            let Candidate { tile, place, sight, .. } = self.candidates[next];
+            let pixel = tile.bounds.pixels[place].pixel;
+            let open = |target: &Target| {
+                !target.settled
+                    && target.best.is_none_or(|best| !best.rank.outranks(sight.best))
+                    && gap_squared(&target.node, pixel) < sight.radius_squared
+            };
             if !targets.iter().any(open) {
                 continue;
             }
             let (first, end) = self.gathered(next);
-            let Candidate { index, tile, place, .. } = self.candidates[next];
-            let pixel = tile.bounds.pixels[place].pixel;
+            let index = self.candidates[next].index;
             for target in targets.iter_mut().filter(|target| open(target)) {
                 self.pairs_tested += u64::from(end - first);
                 for n in &self.neighbors[first as usize..end as usize] {
@@ -586,6 +599,18 @@ impl<'w, 'a> Scratch<'w, 'a> {
             self.see_others(target, &neighbor, pair.pixel, pair.tile, None);
         }
     }
+}
+
+/// The smallest squared distance that [`distance_squared`] can give between a target and a neighbour in a pixel: offsets are
+/// 0 … 1, and every step of it is monotone.
+#[inline]
+fn gap_squared(target: &LineNode, pixel: [i32; 2]) -> f32 {
+    let gap = |axis: usize| {
+        let pixels = (pixel[axis] - target.pixel[axis]) as f32;
+        (pixels + (0.0 - target.offset[axis])).max(-(pixels + (1.0 - target.offset[axis]))).max(0.0)
+    };
+    let (x, y) = (gap(0), gap(1));
+    x * x + y * y
 }
 
 /// The styles of the lines at a place of the lists of a tile, by who has it.
