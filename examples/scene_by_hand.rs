@@ -48,6 +48,7 @@ fn main() -> Result<(), Diagnostics> {
         params: Default::default(),
         priority: None,
         double_sided: true,
+        lines: Default::default(),
         span: None,
     });
     // An octahedron: no normals given, so each face is flat.
@@ -66,6 +67,7 @@ fn main() -> Result<(), Diagnostics> {
             priority: None,
             visible_to: RayKinds::all(),
             lines: true,
+            group: None,
             span: None,
         });
     }

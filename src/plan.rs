@@ -9,7 +9,7 @@ use crate::line::Rules;
 use crate::sample::{NodeColumnSet, SampleLayout};
 use crate::scene::Scene;
 use crate::scene::ids::MaterialId;
-use crate::scene::settings::{Background, FilterKind, LineSettings, RayKinds};
+use crate::scene::settings::{Background, FilterKind, LineOverrides, LineSettings, RayKinds};
 use crate::shade::analysis::OutputFact;
 use crate::shade::bsdf::MIRROR_ROUGHNESS;
 use crate::shade::{InputSet, Mode, OutputSet, Shader, Shaders};
@@ -67,6 +67,8 @@ pub struct LinePlan {
     pub widest: f32,
     /// How far lines reach, in whole pixels: the border of samples that a tile needs around it.
     pub reach: i32,
+    /// The settings with the tests that are on for any material that draws lines.
+    pub tests: LineSettings,
 }
 
 /// What this scene calls for.
@@ -103,7 +105,6 @@ impl Plan {
         let color = layers.iter().any(|layer| matches!(layer, Layer::Rgba | Layer::Color | Layer::Below));
         let used = used_materials(scene);
         let tests = scene.lines();
-        let wants_feature = tests.feature.is_some() || layers.contains(&Layer::Feature);
 
         let has_lights = !scene.lights().is_empty();
         let mut materials: Vec<MaterialPlan> =
@@ -114,8 +115,10 @@ impl Plan {
         let reflection_depth = if reflects { settings.reflection_depth } else { 0 };
         let refraction_depth = if passes { settings.refraction_depth } else { 0 };
 
-        let lines = plan_lines(scene, shaders, layers, &used);
+        let lines = plan_lines(scene, shaders, layers);
         let surfaces = if lines.is_some() { tests.surfaces } else { 1 };
+        let in_play = tests_in_play(scene, &drawing_materials(scene));
+        let wants_feature = in_play.feature.is_some() || layers.contains(&Layer::Feature);
         for (material, shader) in materials.iter_mut().zip(shaders.iter()) {
             let may = shader.analysis().writable();
             if lines.is_some() {
@@ -130,7 +133,7 @@ impl Plan {
             if surfaces > 1 {
                 let behind = &mut material.behind;
                 behind.wanted = material.wanted & (LINE_OUTPUTS | OutputSet::OPACITY);
-                if tests.feature.is_some() {
+                if in_play.feature.is_some() {
                     behind.wanted |= material.wanted & OutputSet::FEATURE;
                 }
                 behind.wanted |= marker(false, true);
@@ -143,11 +146,13 @@ impl Plan {
         let line_paths = lines.is_some() && secondary;
         let throughput_composition = tests.compose == crate::scene::settings::Composition::Throughput;
         let columns = NodeColumnSet {
-            uv: (lines.is_some() && tests.uv.is_some()) || layers.contains(&Layer::Uv),
-            normal: (lines.is_some() && tests.normal.is_some()) || layers.contains(&Layer::Normal),
-            feature: (lines.is_some() && tests.feature.is_some()) || layers.contains(&Layer::Feature),
+            uv: (lines.is_some() && in_play.uv.is_some()) || layers.contains(&Layer::Uv),
+            normal: (lines.is_some() && in_play.normal.is_some()) || layers.contains(&Layer::Normal),
+            feature: (lines.is_some() && in_play.feature.is_some()) || layers.contains(&Layer::Feature),
             depth: lines.is_some() || layers.contains(&Layer::Depth),
             lines: lines.is_some(),
+            member: layers.contains(&Layer::Object) && !scene.stand_ins().is_empty(),
+            overlap: lines.is_some() && in_play.overlap.is_some(),
             throughput: line_paths && (tests.tint || throughput_composition),
             contribution: lines.is_some() && throughput_composition,
         };
@@ -259,26 +264,18 @@ fn plan_material(shader: &Shader, lights: bool, color: bool, used: bool) -> Mate
     }
 }
 
-fn plan_lines(scene: &Scene, shaders: &Shaders, layers: &[Layer], used: &[bool]) -> Option<LinePlan> {
+fn plan_lines(scene: &Scene, shaders: &Shaders, layers: &[Layer]) -> Option<LinePlan> {
     let settings = scene.lines();
     let shown = layers.iter().any(|l| match l {
         Layer::Rgba | Layer::Below | Layer::Line | Layer::LineType(_) | Layer::LinePath(_) => true,
         Layer::HiddenLine => settings.hidden.is_some(),
         _ => false,
     });
-    let tested = settings.object
-        || settings.shader
-        || settings.uv.is_some()
-        || settings.normal.is_some()
-        || settings.feature.is_some();
+    let draws = drawing_materials(scene);
+    let tests = tests_in_play(scene, &draws);
+    let tested = tests.tests_anything();
     if !settings.enabled || !shown || !tested || settings.paths.is_empty() {
         return None;
-    }
-    let mut draws = vec![false; used.len()];
-    for object in scene.objects().iter().filter(|object| object.lines) {
-        for slot in &object.materials {
-            draws[slot.index()] = true;
-        }
     }
     let widest = draws
         .iter()
@@ -293,12 +290,57 @@ fn plan_lines(scene: &Scene, shaders: &Shaders, layers: &[Layer], used: &[bool])
     if widest <= 0.0 {
         return None;
     }
-    let rules = Rules::new(settings, scene.render().samples).with_widest(widest);
+    // What draws no lines decides about none.
+    let overrides = scene.materials().iter().zip(&draws);
+    let overrides: Vec<_> =
+        overrides.map(|(material, draws)| draws.then_some(material.lines).unwrap_or_default()).collect();
+    // Nodes tell of an object in a group only the group.
+    let mut settings = settings.clone();
+    let stand_ins = scene.stand_ins();
+    for id in settings.hidden.iter_mut().flat_map(|hidden| hidden.objects.iter_mut().flatten()) {
+        *id = stand_ins.get(id.index()).copied().unwrap_or(*id);
+    }
+    let rules = Rules::new(&settings, scene.render().samples).with_widest(widest).with_materials(&overrides);
     // Only layers by type tell why a line is there.
     let by_type = layers.iter().any(|layer| matches!(layer, Layer::LineType(_)));
     let rules = if by_type { rules } else { rules.with_any_pair() };
     let reach = rules.reach();
-    Some(LinePlan { rules, widest, reach })
+    Some(LinePlan { rules, widest, reach, tests })
+}
+
+/// Which materials are on objects that draw lines.
+fn drawing_materials(scene: &Scene) -> Vec<bool> {
+    let mut draws = vec![false; scene.materials().len()];
+    for object in scene.objects().iter().filter(|object| object.lines) {
+        for slot in &object.materials {
+            draws[slot.index()] = true;
+        }
+    }
+    draws
+}
+
+/// The tests that are on for any material that draws lines.
+fn tests_in_play(scene: &Scene, draws: &[bool]) -> LineSettings {
+    let none = LineOverrides {
+        object: Some(false),
+        shader: Some(false),
+        uv: Some(None),
+        normal: Some(None),
+        feature: Some(None),
+        overlap: Some(None),
+    };
+    let drawing = scene.materials().iter().zip(draws).filter(|(_, draws)| **draws);
+    drawing.map(|(material, _)| material.lines.over(scene.lines())).fold(none.over(scene.lines()), |all, one| {
+        LineSettings {
+            object: all.object || one.object,
+            shader: all.shader || one.shader,
+            uv: all.uv.or(one.uv),
+            normal: all.normal.or(one.normal),
+            feature: all.feature.or(one.feature),
+            overlap: all.overlap.or(one.overlap),
+            ..all
+        }
+    })
 }
 
 fn explain(plan: &Plan, scene: &Scene, shaders: &Shaders) -> String {
@@ -353,7 +395,10 @@ fn explain(plan: &Plan, scene: &Scene, shaders: &Shaders) -> String {
             "none: nothing reads light and nothing is lit".into()
         },
     );
-    row("lines", explain_lines(plan, scene.lines()));
+    row("lines", explain_lines(plan, scene));
+    if plan.lines.is_some() && !scene.stand_ins().is_empty() {
+        row("groups", explain_groups(scene));
+    }
     row("strata", "1: no lens, no shutter, no rough mirror".into());
     row("surfaces", explain_surfaces(plan, scene.lines()));
     row("columns", columns(plan).join(" "));
@@ -383,16 +428,48 @@ fn explain(plan: &Plan, scene: &Scene, shaders: &Shaders) -> String {
     text
 }
 
-fn explain_lines(plan: &Plan, settings: &LineSettings) -> String {
-    let Some(lines) = &plan.lines else {
-        return if settings.enabled { "none: no line can be seen" } else { "none: switched off" }.into();
-    };
+fn tests_of(settings: &LineSettings) -> Vec<String> {
     let mut tests = Vec::new();
     tests.extend(settings.object.then(|| "object".to_owned()));
     tests.extend(settings.shader.then(|| "shader".to_owned()));
     tests.extend(settings.uv.map(|t| format!("uv > {t}")));
     tests.extend(settings.normal.map(|t| format!("normal > {t} degrees")));
     tests.extend(settings.feature.map(|t| format!("feature > {t}")));
+    tests.extend(settings.overlap.map(|t| format!("overlap > {t}")));
+    tests
+}
+
+/// Which objects count as one.
+fn explain_groups(scene: &Scene) -> String {
+    let mut groups: Vec<(&str, usize)> = Vec::new();
+    for group in scene.objects().iter().filter_map(|object| object.group.as_deref()) {
+        match groups.iter_mut().find(|(known, _)| *known == group) {
+            Some((_, count)) => *count += 1,
+            None => groups.push((group, 1)),
+        }
+    }
+    let groups: Vec<_> = groups.iter().map(|(group, count)| format!("{group} ({count} objects)")).collect();
+    let groups: Vec<_> = groups.iter().map(String::as_str).collect();
+    format!("count as one in the object test: {}", shorten(&groups))
+}
+
+fn explain_lines(plan: &Plan, scene: &Scene) -> String {
+    let settings = scene.lines();
+    let Some(lines) = &plan.lines else {
+        return if settings.enabled { "none: no line can be seen" } else { "none: switched off" }.into();
+    };
+    let mut tests = vec![match &tests_of(settings)[..] {
+        [] => "nothing".to_owned(),
+        tests => tests.join(", "),
+    }];
+    for (material, draws) in scene.materials().iter().zip(drawing_materials(scene)) {
+        let own = material.lines.over(settings);
+        if draws && own != *settings {
+            let own = tests_of(&own);
+            let own = if own.is_empty() { "nothing".to_owned() } else { own.join(", ") };
+            tests.push(format!("for lines of {}: {own}", material.name));
+        }
+    }
     let mut paths = vec!["camera"];
     paths.retain(|_| settings.paths.contains(RayKinds::CAMERA));
     if plan.reflection_depth > 0 && settings.paths.contains(RayKinds::REFLECTION) {
@@ -403,7 +480,7 @@ fn explain_lines(plan: &Plan, settings: &LineSettings) -> String {
     }
     format!(
         "where {} differ; seen by {}; at most {} px wide, so tiles need {} px around them",
-        tests.join(", "),
+        tests.join("; "),
         paths.join(", "),
         // The bounds of scripts are rounded outwards; nobody needs to read that.
         (lines.widest * 1e3).round() / 1e3,
@@ -412,12 +489,11 @@ fn explain_lines(plan: &Plan, settings: &LineSettings) -> String {
 }
 
 fn explain_surfaces(plan: &Plan, settings: &LineSettings) -> String {
-    if plan.surfaces <= 1 {
+    let Some(lines) = plan.lines.as_ref().filter(|_| plan.surfaces > 1) else {
         let why = if settings.surfaces > 1 { "no line can be seen" } else { "`lines.surfaces` asks for no more" };
         return format!("1: {why}");
-    }
-    let shapes = settings.uv.is_some() || settings.normal.is_some() || settings.feature.is_some();
-    let counted = match (shapes, settings.object, settings.shader) {
+    };
+    let counted = match (lines.tests.tests_shapes(), lines.tests.object, lines.tests.shader) {
         (true, ..) => "each time a ray meets one",
         (false, true, true) => "each object and material once",
         (false, true, false) => "each object once",
@@ -448,6 +524,8 @@ fn columns(plan: &Plan) -> Vec<&'static str> {
         (set.feature, "feature"),
         (set.depth, "depth"),
         (set.lines, "line_color line_width priority"),
+        (set.member, "member"),
+        (set.overlap, "node_position geometric_normal footprint"),
         (set.throughput, "throughput"),
         (set.contribution, "contribution"),
         (plan.layout.position, "position"),

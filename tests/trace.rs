@@ -27,6 +27,7 @@ fn builder() -> SceneBuilder {
         params: Default::default(),
         priority: None,
         double_sided: true,
+        lines: Default::default(),
         span: None,
     });
     builder
@@ -42,6 +43,7 @@ fn place(builder: &mut SceneBuilder, mesh: Mesh, world_from_object: DAffine3) {
         priority: None,
         visible_to: RayKinds::all(),
         lines: true,
+        group: None,
         span: None,
     });
 }
@@ -332,6 +334,7 @@ fn a_mesh_used_ten_thousand_times_is_stored_once() {
                 priority: None,
                 visible_to: RayKinds::all(),
                 lines: true,
+                group: None,
                 span: None,
             });
         }

@@ -32,6 +32,8 @@ pub enum Command {
     Render(Box<RenderArguments>),
     /// Prints what a render would do, with reasons, without making a pixel.
     Explain(Box<ExplainArguments>),
+    /// Tells why there is a line at a place of the picture, or why there is none.
+    Why(Box<WhyArguments>),
     /// Checks, measures, starts and shows shaders.
     Shader {
         /// What to do.
@@ -83,6 +85,27 @@ pub struct RenderArguments {
 pub struct ExplainArguments {
     #[command(flatten)]
     pub scene: SceneArguments,
+}
+
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Examples:\n  \
+        tusche why scene.toml 320,200              the sample nearest to the middle of a pixel\n  \
+        tusche why scene.toml 320.25,200.75        the sample nearest to a place in it\n  \
+        tusche why scene.toml 10,10 --size 64x48 --json",
+    mut_arg("output", |argument| argument.hide(true)),
+    mut_arg("layer", |argument| argument.hide(true)),
+    mut_arg("lines", |argument| argument.hide(true))
+)]
+pub struct WhyArguments {
+    #[command(flatten)]
+    pub scene: SceneArguments,
+    /// The place in pixels from the upper left corner of the picture. A whole number means the middle of its pixel.
+    #[arg(value_name = "X,Y")]
+    pub place: Place,
+    /// Prints the explanation as JSON.
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// What decides the picture itself.
@@ -224,6 +247,27 @@ impl FromStr for Size {
             return Err("a picture has at least one pixel each way".into());
         }
         Ok(Self(size))
+    }
+}
+
+/// `X,Y`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Place(pub [f32; 2]);
+
+impl FromStr for Place {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (x, y) = text.split_once(',').ok_or("write it as X,Y, for example 320,200 or 320.25,200.75")?;
+        let number = |text: &str| {
+            let text = text.trim();
+            let middle = if text.parse::<i64>().is_ok() { 0.5 } else { 0.0 };
+            match text.parse::<f32>() {
+                Ok(number) if number.is_finite() => Ok(number + middle),
+                _ => Err(format!("`{text}` is not a number of pixels")),
+            }
+        };
+        Ok(Self([number(x)?, number(y)?]))
     }
 }
 

@@ -9,6 +9,7 @@ mod render;
 mod request;
 mod shader;
 mod terminal;
+mod why;
 
 use std::io::Write;
 
@@ -54,6 +55,7 @@ pub fn run() -> u8 {
     let result = match arguments.command {
         Command::Render(arguments) => render::run(&arguments),
         Command::Explain(arguments) => explain::run(&arguments),
+        Command::Why(arguments) => why::run(&arguments),
         Command::Shader { command } => shader::run(&command),
         Command::Compare(arguments) => compare::run(&arguments),
         Command::Schema => print(&format!("{:#}\n", crate::scene::file::schema())),

@@ -350,7 +350,7 @@ fn nearest_value(layer: &Layer) -> Option<fn(&SampleBuffer, usize) -> [f32; 3]> 
             let [u, v] = buffer.paths[0].uv.get(sample);
             at_hit(buffer, sample, [u, v, 0.0])
         }),
-        Layer::Object => Some(|buffer, sample| [f32::from_bits(buffer.paths[0].object.get(sample)), 0.0, 0.0]),
+        Layer::Object => Some(|buffer, sample| [f32::from_bits(buffer.paths[0].object_itself(sample)), 0.0, 0.0]),
         Layer::Feature => Some(|buffer, sample| at_hit(buffer, sample, buffer.paths[0].feature.get(sample))),
         Layer::Rgba
         | Layer::Color

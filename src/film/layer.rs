@@ -95,12 +95,13 @@ const AOV_PREFIX: &str = "aov_";
 
 impl Layer {
     /// All layers but the scripts' own, in the order of the documentation.
-    pub const FIXED: [Self; 20] = [
+    pub const FIXED: [Self; 21] = [
         Self::Rgba,
         Self::Color,
         Self::Line,
         Self::LineType(LineType::Outline),
         Self::LineType(LineType::Silhouette),
+        Self::LineType(LineType::Overlap),
         Self::LineType(LineType::Material),
         Self::LineType(LineType::Crease),
         Self::LineType(LineType::Uv),
@@ -180,12 +181,7 @@ impl fmt::Display for Layer {
             Self::Rgba => "rgba",
             Self::Color => "color",
             Self::Line => "line",
-            Self::LineType(LineType::Outline) => "line.outline",
-            Self::LineType(LineType::Silhouette) => "line.silhouette",
-            Self::LineType(LineType::Material) => "line.material",
-            Self::LineType(LineType::Crease) => "line.crease",
-            Self::LineType(LineType::Uv) => "line.uv",
-            Self::LineType(LineType::Feature) => "line.feature",
+            Self::LineType(kind) => return write!(f, "line.{}", kind.name()),
             Self::LinePath(LinePath::Camera) => "line.camera",
             Self::LinePath(LinePath::Reflection) => "line.reflection",
             Self::LinePath(LinePath::Refraction) => "line.refraction",

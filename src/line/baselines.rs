@@ -19,7 +19,7 @@
 
 use std::collections::HashMap;
 
-use super::pair::distance_squared;
+use super::pair::{distance_squared, fired};
 use super::window::{PathTile, PathWindow};
 use super::{Fired, LineCounts, LineNode, Rules, SeenLine};
 use crate::math::Vec3;
@@ -38,7 +38,7 @@ pub(super) fn choudhury(
     for row in 0..targets.nodes.rows.len() {
         let (mut probes, mut differing) = (0_u32, 0_u32);
         let mut nearest: Option<(f32, SeenLine)> = None;
-        let t = node_of(targets, row);
+        let (t, target) = (node_of(targets, row), row);
         visit(window, &t, radius, |n, tile, row| {
             counts.pairs_tested += 1;
             let distance_squared = distance_squared(&t, n.pixel, n.offset);
@@ -46,7 +46,7 @@ pub(super) fn choudhury(
                 return;
             }
             probes += 1;
-            let fired = rules.tests().fired(&t.features, &n.features);
+            let fired = fired(rules, (targets, target, &t), (tile, row, n));
             if fired.is_empty() {
                 return;
             }
@@ -82,20 +82,20 @@ pub(super) fn bauer(
     };
 
     // The contour image as far as it can matter here.
-    let mut last: HashMap<[i32; 2], LineNode> = HashMap::new();
+    let mut last: HashMap<[i32; 2], (&PathTile<'_>, usize, LineNode)> = HashMap::new();
     for segment in window.segments(targets.buffer.rect.grown(radius.ceil() as i32 + 1)) {
         for pixel in (segment.x0..segment.x1).map(|x| [x, segment.y]) {
             for row in segment.tile.nodes.rows.of_pixel(segment.tile.buffer.pixel_number(pixel)) {
                 let node = segment.tile.node(pixel, row);
-                last.insert(cell(&node), node);
+                last.insert(cell(&node), (segment.tile, row, node));
             }
         }
     }
     let contour = |at: [i32; 2]| {
-        let own = last.get(&at)?;
+        let (tile, row, own) = last.get(&at)?;
         let beside = [[at[0] + 1, at[1]], [at[0], at[1] + 1]];
-        let fired =
-            beside.iter().filter_map(|at| last.get(at)).map(|n| rules.tests().fired(&own.features, &n.features));
+        let beside = beside.iter().filter_map(|at| last.get(at));
+        let fired = beside.map(|(other, n_row, n)| fired(rules, (tile, *row, own), (other, *n_row, n)));
         Some(fired.fold(Fired::empty(), |all, one| all | one)).filter(|fired| !fired.is_empty())
     };
 

@@ -10,6 +10,7 @@
 
 use super::differ::Tests;
 use super::list::bounds::LayerBounds;
+use super::overlap::{Facet, FacetBounds};
 use super::pair::Rank;
 use super::rules::Rules;
 use super::window::style;
@@ -44,6 +45,7 @@ impl TileBounds {
             path.radius_squared.bytes()
                 + size_of_val(&path.pixels[..])
                 + size_of_val(&path.shapes[..])
+                + size_of_val(&path.facets[..])
                 + size_of_val(&path.by_rank[..])
                 + size_of_val(&path.blocks[..])
                 + path.behind.iter().map(LayerBounds::bytes).sum::<usize>()
@@ -186,6 +188,17 @@ pub(super) enum Stylist {
 }
 
 impl Bounds {
+    /// Smallest and largest `shader` value.
+    #[inline]
+    pub(super) fn shaders(&self) -> [u32; 2] {
+        self.shader
+    }
+
+    /// Whether some object may be both here and there.
+    fn may_share_object(&self, other: &Self) -> bool {
+        self.object[0] <= other.object[1] && other.object[0] <= self.object[1] && self.object[1] > 0
+    }
+
     pub(super) const EMPTY: Self = Self {
         object: [u32::MAX, 0],
         shader: [u32::MAX, 0],
@@ -219,21 +232,25 @@ impl Bounds {
     }
 }
 
-/// Bounds with a shape, which is empty where no test reads it.
+/// Bounds with a shape and facets, which are empty where no test reads them.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Bounded<'a> {
     pub bounds: &'a Bounds,
     pub shape: &'a Shape,
+    pub facets: &'a FacetBounds,
 }
 
 impl Bounded<'_> {
-    /// Whether a node here and one there may differ.
+    /// Whether a node here and one there, at least so far apart on the film, may differ.
     #[inline]
-    pub(super) fn may_differ(&self, other: &Bounded<'_>, tests: &Tests) -> bool {
+    pub(super) fn may_differ(&self, other: &Bounded<'_>, gap_squared: f32, tests: &Tests) -> bool {
         let uniform = |a: [u32; 2], b: [u32; 2]| a[0] == a[1] && b == a;
         (tests.object && !uniform(self.bounds.object, other.bounds.object))
             || (tests.shader && !uniform(self.bounds.shader, other.bounds.shader))
             || (tests.reads_shapes && self.shape.may_differ(other.shape, tests))
+            || (tests.reads_facets()
+                && self.bounds.may_share_object(other.bounds)
+                && self.facets.may_overlap(other.facets, gap_squared, tests.overlap))
     }
 
     /// Whether all nodes here surely differ from all there.
@@ -265,7 +282,8 @@ pub(super) struct Block {
     /// The pixels of the picture, whether they have nodes or not.
     pub rect: PixelRect,
     pub bounds: Bounds,
-    pub shape: Shape,
+    shape: Shape,
+    facets: FacetBounds,
     /// Its first pixel in [`PathBounds::pixels`].
     pub first: u32,
     /// One past its last.
@@ -275,7 +293,7 @@ pub(super) struct Block {
 impl Block {
     #[inline]
     pub(super) fn bounded(&self) -> Bounded<'_> {
-        Bounded { bounds: &self.bounds, shape: &self.shape }
+        Bounded { bounds: &self.bounds, shape: &self.shape, facets: &self.facets }
     }
 }
 
@@ -286,14 +304,17 @@ pub(super) struct PathBounds {
     /// Square of the radius of each row's line, 0 if it draws none.
     pub radius_squared: Column<f32>,
     /// The whole tile's.
-    pub bounds: Bounds,
-    pub shape: Shape,
+    bounds: Bounds,
+    shape: Shape,
+    facets_of_all: FacetBounds,
     /// Blocks that have nodes, row by row.
     pub blocks: Vec<Block>,
     /// The blocks' pixels, block by block, in each row by row.
     pub pixels: Vec<PixelNodes>,
     /// Of the same pixels; nothing where no test reads it.
     shapes: Vec<Shape>,
+    /// The same.
+    facets: Vec<FacetBounds>,
     /// For each block its pixels from the highest best rank down, counted from its first: the search cuts off at the
     /// first that is too low.
     pub by_rank: Vec<u8>,
@@ -308,9 +329,11 @@ impl PathBounds {
             radius_squared: radii_squared(&nodes.line_width, rules),
             bounds: Bounds::EMPTY,
             shape: Shape::EMPTY,
+            facets_of_all: FacetBounds::EMPTY,
             blocks: Vec::new(),
             pixels: Vec::new(),
             shapes: Vec::new(),
+            facets: Vec::new(),
             by_rank: Vec::new(),
             behind: Vec::new(),
         };
@@ -346,6 +369,10 @@ impl PathBounds {
                 if tests.reads_shapes {
                     self.shapes.push(shape_of_rows(nodes, start, end, tests));
                 }
+                if tests.reads_facets() {
+                    let hits = (start..end).filter(|row| nodes.object.get(*row) != 0);
+                    self.facets.push(FacetBounds::of(hits.map(|row| Facet::of(nodes, row))));
+                }
             }
         }
         let pixels = &self.pixels[first..];
@@ -354,22 +381,28 @@ impl PathBounds {
         }
         let bounds = pixels.iter().fold(Bounds::EMPTY, |all, pixel| all.union(&pixel.bounds, nodes));
         let shape = self.shapes.get(first..).unwrap_or_default().iter().fold(Shape::EMPTY, |all, one| all.union(one));
+        let facets = FacetBounds::of_all(self.facets.get(first..).unwrap_or_default());
         let start = self.by_rank.len();
         self.by_rank.extend((0..).take(pixels.len()).map(|index: u8| index));
         self.by_rank[start..].sort_unstable_by_key(|&index| (pixels[usize::from(index)].bounds.best, index));
         self.bounds = self.bounds.union(&bounds, nodes);
         self.shape = self.shape.union(&shape);
-        self.blocks.push(Block { rect, bounds, shape, first: first as u32, end: self.pixels.len() as u32 });
+        self.facets_of_all = self.facets_of_all.union(&facets);
+        self.blocks.push(Block { rect, bounds, shape, facets, first: first as u32, end: self.pixels.len() as u32 });
     }
 
     pub(super) fn bounded(&self) -> Bounded<'_> {
-        Bounded { bounds: &self.bounds, shape: &self.shape }
+        Bounded { bounds: &self.bounds, shape: &self.shape, facets: &self.facets_of_all }
     }
 
     /// The bounds of a pixel, by its place in [`Self::pixels`].
     #[inline]
     pub(super) fn of_pixel(&self, place: usize) -> Bounded<'_> {
-        Bounded { bounds: &self.pixels[place].bounds, shape: self.shapes.get(place).unwrap_or(&Shape::EMPTY) }
+        Bounded {
+            bounds: &self.pixels[place].bounds,
+            shape: self.shapes.get(place).unwrap_or(&Shape::EMPTY),
+            facets: self.facets.get(place).unwrap_or(&FacetBounds::EMPTY),
+        }
     }
 }
 

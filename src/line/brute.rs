@@ -1,7 +1,7 @@
 //! The definition as plain loops (DESIGN section 3.2), to be read beside the text. The oracle of [`super::search`]. For
 //! lists of surfaces see [`super::list`].
 
-use super::pair::{Found, MOST_LINES, Pair, Taken, distance_squared};
+use super::pair::{Found, MOST_LINES, Pair, Taken, distance_squared, fired};
 use super::window::{PathTile, PathWindow};
 use super::{LineCounts, Rules};
 use crate::sample::PixelRect;
@@ -50,6 +50,7 @@ fn seen(
     counts: &mut LineCounts,
 ) -> Option<Pair> {
     let [x, y] = targets.buffer.pixel_of(targets.nodes.rows.sample(row));
+    let target = row;
     let t = targets.node([x, y], row);
     let mut seen: Option<Pair> = None;
 
@@ -61,8 +62,8 @@ fn seen(
                 let n = tile.node(pixel, row);
                 counts.pairs_tested += 1;
 
-                // … with differ(t, n):
-                if !rules.tests().differ(&t.features, &n.features) {
+                // … with differ(t, n), as the material of the priority sample tests:
+                if fired(rules, (targets, target, &t), (tile, row, &n)).is_empty() {
                     continue;
                 }
                 // the priority sample p: the larger explicit priority, else the shorter depth, else t.

@@ -29,6 +29,8 @@ bitflags! {
         const FEATURE = 16;
         /// One side is a miss (set beside `OBJECT` or `SHADER`).
         const MISS = 32;
+        /// The object folds over itself.
+        const OVERLAP = 64;
     }
 }
 
@@ -59,7 +61,9 @@ pub(super) struct Tests {
     pub chord_squared: f32,
     /// Largest difference of a channel that is no difference.
     pub feature: f32,
-    /// Whether any of the last three is on.
+    /// Largest overlap that is none.
+    pub overlap: f32,
+    /// Whether the test of uv, normals or feature colours is on.
     pub reads_shapes: bool,
 }
 
@@ -71,19 +75,52 @@ impl Tests {
             uv_squared: settings.uv.map_or(f32::INFINITY, |distance| distance.max(0.0) * distance.max(0.0)),
             chord_squared: settings.normal.map_or(f32::INFINITY, chord_squared),
             feature: settings.feature.map_or(f32::INFINITY, |difference| difference.max(0.0)),
+            overlap: settings.overlap.map_or(f32::INFINITY, |pixels| pixels.max(0.0)),
             reads_shapes: false,
         };
         tests.reads_shapes = tests.uv_squared.min(tests.chord_squared).min(tests.feature) < f32::INFINITY;
         tests
     }
 
-    /// Whether any test finds a difference.
+    /// What finds a difference wherever one of the two does.
+    pub(super) fn looser(self, other: &Self) -> Self {
+        Self {
+            object: self.object | other.object,
+            shader: self.shader | other.shader,
+            uv_squared: self.uv_squared.min(other.uv_squared),
+            chord_squared: self.chord_squared.min(other.chord_squared),
+            feature: self.feature.min(other.feature),
+            overlap: self.overlap.min(other.overlap),
+            reads_shapes: self.reads_shapes | other.reads_shapes,
+        }
+    }
+
+    /// What finds a difference only where both do, test by test.
+    pub(super) fn stricter(self, other: &Self) -> Self {
+        Self {
+            object: self.object & other.object,
+            shader: self.shader & other.shader,
+            uv_squared: self.uv_squared.max(other.uv_squared),
+            chord_squared: self.chord_squared.max(other.chord_squared),
+            feature: self.feature.max(other.feature),
+            overlap: self.overlap.max(other.overlap),
+            reads_shapes: self.reads_shapes & other.reads_shapes,
+        }
+    }
+
+    /// Whether the overlap test is on: the one test that also asks where the nodes lie.
+    #[inline(always)]
+    pub(super) fn reads_facets(&self) -> bool {
+        self.overlap < f32::INFINITY
+    }
+
+    /// Whether any test finds a difference, the overlap test apart.
     #[inline]
     pub(super) fn differ(&self, a: &Features, b: &Features) -> bool {
         !self.fired(a, b).is_empty()
     }
 
-    /// Which tests find a difference.
+    /// Which tests find a difference, the overlap test apart.
     #[inline]
     pub(super) fn fired(&self, a: &Features, b: &Features) -> Fired {
         let mut fired = Fired::empty();

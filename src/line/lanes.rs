@@ -5,7 +5,10 @@
 //! more by them. The loops are plain Rust that the compiler vectorises for the instructions that [`pulp::Arch`] finds at
 //! run time.
 
+use super::Rules;
 use super::differ::Tests;
+use super::materials::TestColumns;
+use super::overlap::{Facet, FacetColumns};
 use super::pair::{LineNode, Rank};
 use super::window::PathTile;
 
@@ -54,6 +57,16 @@ struct Columns {
     uv: [Vec<f32>; 2],
     normal: [Vec<f32>; 3],
     feature: [Vec<f32>; 3],
+    facet: FacetColumns,
+    /// Where materials have tests of their own.
+    tests: TestColumns,
+}
+
+/// A target as loops see it.
+#[derive(Clone, Copy)]
+pub(super) struct LaneTarget<'a> {
+    pub node: &'a LineNode,
+    pub facet: &'a Facet,
 }
 
 /// How ranks become 32 bits in the same order.
@@ -102,10 +115,12 @@ impl Lanes {
 
     /// Removes all neighbours.
     pub(super) fn clear(&mut self) {
-        let Columns { pixel, offset, key, radius_squared, object, shader, uv, normal, feature } = &mut self.columns;
+        let Columns { pixel, offset, key, radius_squared, object, shader, uv, normal, feature, facet, tests } =
+            &mut self.columns;
         let floats = pixel.iter_mut().chain(offset).chain(uv).chain(normal).chain(feature).chain([radius_squared]);
-        floats.for_each(Vec::clear);
-        [key, object, shader].into_iter().for_each(Vec::clear);
+        floats.chain(facet.columns()).for_each(Vec::clear);
+        tests.floats().into_iter().for_each(Vec::clear);
+        [key, object, shader].into_iter().chain(tests.ids()).for_each(Vec::clear);
         self.origins.clear();
         self.ranks.clear();
         self.certain = true;
@@ -113,7 +128,7 @@ impl Lanes {
 
     /// Adds a neighbour for targets in pixel `from`.
     #[inline]
-    pub(super) fn push(&mut self, origin: Origin, from: [i32; 2], rank: Rank, nodes: &PathTile<'_>, tests: &Tests) {
+    pub(super) fn push(&mut self, origin: Origin, from: [i32; 2], rank: Rank, nodes: &PathTile<'_>, rules: &Rules) {
         let row = origin.row as usize;
         let offset = nodes.offset(row);
         let columns = &mut self.columns;
@@ -126,10 +141,18 @@ impl Lanes {
             let features = nodes.features(row);
             columns.object.push(features.object);
             columns.shader.push(features.shader);
-            if tests.reads_shapes {
+            let tests = rules.tests();
+            let mixed = rules.materials().is_some();
+            if tests.reads_shapes || tests.reads_facets() || mixed {
                 push(&mut columns.uv, features.uv);
                 push(&mut columns.normal, features.normal);
                 push(&mut columns.feature, features.feature);
+            }
+            if tests.reads_facets() || mixed {
+                columns.facet.push(&Facet::of(nodes.nodes, row));
+            }
+            if mixed {
+                columns.tests.push(rules.tests_of(features.shader));
             }
         }
         self.ranks.push(rank);
@@ -151,29 +174,32 @@ impl Lanes {
         self.columns.key.extend(self.ranks.iter().map(|rank| keys.of(*rank)));
 
         let count = self.len().next_multiple_of(LANES);
-        let Columns { pixel, offset, key, radius_squared, object, shader, uv, normal, feature } = &mut self.columns;
+        let Columns { pixel, offset, key, radius_squared, object, shader, uv, normal, feature, facet, tests } =
+            &mut self.columns;
         pixel.iter_mut().for_each(|column| column.resize(count, f32::INFINITY));
         let floats = offset.iter_mut().chain(uv).chain(normal).chain(feature).chain([radius_squared]);
+        let floats = floats.chain(facet.columns()).chain(tests.floats());
         floats.filter(|column| !column.is_empty()).for_each(|column| column.resize(count, 0.0));
-        let ids = [key, object, shader].into_iter().filter(|column| !column.is_empty());
+        let ids = [key, object, shader].into_iter().chain(tests.ids()).filter(|column| !column.is_empty());
         ids.for_each(|column| column.resize(count, 0));
         self.scores.resize(count, NONE);
     }
 
     /// Scores the neighbours whose line the target sees, by rank; the best score.
-    pub(super) fn score_others(&mut self, target: &LineNode, tests: &Tests) -> u32 {
-        self.score::<false>(target, tests)
+    pub(super) fn score_others(&mut self, target: LaneTarget<'_>, rules: &Rules) -> u32 {
+        // The neighbours' materials decide.
+        self.score::<false>(target, rules.tests(), rules.materials().is_some())
     }
 
     /// Scores the neighbours that give the target a line of its own, by distance; the best score.
-    pub(super) fn score_own(&mut self, target: &LineNode, tests: &Tests) -> u32 {
-        self.score::<true>(target, tests)
+    pub(super) fn score_own(&mut self, target: LaneTarget<'_>, rules: &Rules) -> u32 {
+        self.score::<true>(target, rules.tests_of(target.node.features.shader), false)
     }
 
-    fn score<const OWN: bool>(&mut self, target: &LineNode, tests: &Tests) -> u32 {
-        let end = self.keys.end_of_outranking(target.rank);
+    fn score<const OWN: bool>(&mut self, target: LaneTarget<'_>, tests: &Tests, mixed: bool) -> u32 {
+        let end = self.keys.end_of_outranking(target.node.rank);
         let Self { columns, scores, certain, .. } = self;
-        self.arch.dispatch(Score::<OWN> { columns, scores, certain: *certain, target, end, tests })
+        self.arch.dispatch(Score::<OWN> { columns, scores, certain: *certain, target, end, tests, mixed })
     }
 
     /// The neighbours that the last scoring gave a score.
@@ -193,10 +219,12 @@ struct Score<'a, const OWN: bool> {
     columns: &'a Columns,
     scores: &'a mut [u32],
     certain: bool,
-    target: &'a LineNode,
+    target: LaneTarget<'a>,
     /// Keys below this outrank the target.
     end: u32,
     tests: &'a Tests,
+    /// Whether each neighbour is tested as its own column of tests says.
+    mixed: bool,
 }
 
 impl<const OWN: bool> pulp::WithSimd for Score<'_, OWN> {
@@ -207,6 +235,10 @@ impl<const OWN: bool> pulp::WithSimd for Score<'_, OWN> {
     fn with_simd<S: pulp::Simd>(self, _: S) -> u32 {
         if self.certain {
             self.run::<{ Differ::CERTAIN }>()
+        } else if self.mixed {
+            self.run::<{ Differ::MIXED }>()
+        } else if self.tests.reads_facets() {
+            self.run::<{ Differ::BY_FACETS }>()
         } else if self.tests.reads_shapes {
             self.run::<{ Differ::BY_SHAPES }>()
         } else {
@@ -222,12 +254,14 @@ impl Differ {
     const CERTAIN: u8 = 0;
     const BY_IDS: u8 = 1;
     const BY_SHAPES: u8 = 2;
+    const BY_FACETS: u8 = 3;
+    const MIXED: u8 = 4;
 }
 
 impl<const OWN: bool> Score<'_, OWN> {
     #[inline(always)]
     fn run<const DIFFER: u8>(self) -> u32 {
-        let Self { columns, scores, target, end, tests, .. } = self;
+        let Self { columns, scores, target: LaneTarget { node: target, facet: own_facet }, end, tests, .. } = self;
         let count = scores.len();
         let ids = if DIFFER >= Differ::BY_IDS { count } else { 0 };
         let shapes = if DIFFER >= Differ::BY_SHAPES { count } else { 0 };
@@ -238,7 +272,9 @@ impl<const OWN: bool> Score<'_, OWN> {
         let uv = columns.uv.each_ref().map(|column| &column[..shapes]);
         let normal = columns.normal.each_ref().map(|column| &column[..shapes]);
         let feature = columns.feature.each_ref().map(|column| &column[..shapes]);
-        let (own, tests) = (target.features, *tests);
+        let facet = columns.facet.rows(if DIFFER >= Differ::BY_FACETS { count } else { 0 });
+        let mixed = columns.tests.rows(if DIFFER == Differ::MIXED { count } else { 0 });
+        let (own, own_facet, common) = (target.features, *own_facet, *tests);
         let own_hit = !own.is_miss();
 
         let mut best = NONE;
@@ -248,7 +284,8 @@ impl<const OWN: bool> Score<'_, OWN> {
             let y = pixel[1][i] + (offset[1][i] - target.offset[1]);
             let distance_squared = x * x + y * y;
 
-            // As `Tests::fired`.
+            // As `pair::fired`.
+            let tests = if DIFFER == Differ::MIXED { mixed.get(i) } else { common };
             let mut differs = true;
             if DIFFER >= Differ::BY_IDS {
                 differs = (tests.object & (object[i] != own.object)) | (tests.shader & (shader[i] != own.shader));
@@ -265,6 +302,10 @@ impl<const OWN: bool> Score<'_, OWN> {
                     | (g.abs() > tests.feature)
                     | (b.abs() > tests.feature);
                 differs |= own_hit & (object[i] != 0) & shapes;
+            }
+            if DIFFER >= Differ::BY_FACETS {
+                let overlaps = own_facet.overlaps(&facet.get(i), distance_squared, tests.overlap);
+                differs |= own_hit & (object[i] == own.object) & overlaps;
             }
 
             let score = if OWN {

@@ -6,16 +6,19 @@
 //! size, threads and method change no bit.
 //!
 //! `brute` is the definition as plain loops and the oracle for `search`, which gives the same bits much sooner. What
-//! decides is shared by both: `differ`, `pair`, [`Rules`]. `list` holds both once more for lists of surfaces (DESIGN section
-//! 3.4). `bounds` and `lanes` are the search's: what is known of many nodes
+//! decides is shared by both: `differ`, `overlap`, `materials`, `pair`, [`Rules`]. `list` holds both once more for lists of
+//! surfaces (DESIGN section 3.4). `bounds` and `lanes` are the search's: what is known of many nodes
 //! at once, and the loops over neighbours that are left.
 
 mod baselines;
 mod bounds;
 mod brute;
 mod differ;
+mod inspect;
 mod lanes;
 mod list;
+mod materials;
+mod overlap;
 mod pair;
 mod rules;
 mod search;
@@ -24,8 +27,11 @@ mod window;
 
 pub use bounds::TileBounds;
 pub use differ::Fired;
+pub use inspect::{InspectedPair, TestResult, inspect, nearest_difference};
 pub use rules::Rules;
 pub use window::{LineTile, Window};
+
+pub use crate::scene::settings::LineType;
 
 use crate::sample::{NodePath, PixelRect};
 use list::Kind;
@@ -44,23 +50,6 @@ pub enum Method {
     Choudhury,
     /// Bauer 2017: one style, a contour image of sub-pixels; camera nodes only.
     Bauer,
-}
-
-/// What kind of feature a line marks (DESIGN section 3.6), by the strongest reason, in this order.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum LineType {
-    /// One side is a miss.
-    Outline,
-    /// The objects differ.
-    Silhouette,
-    /// The materials differ.
-    Material,
-    /// The normals differ.
-    Crease,
-    /// The texture coordinates differ.
-    Uv,
-    /// The feature colours differ.
-    Feature,
 }
 
 /// The line that a sample sees. With [`Rules::with_any_pair`], `fired`, `neighbor` and `own` may be those of another pair

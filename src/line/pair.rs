@@ -1,7 +1,10 @@
 //! One target and one neighbour: who styles the line, whether it is valid, and which of two valid pairs is seen
 //! (DESIGN section 3.2). Everything here is shared by the oracle and the search, so they cannot disagree by a rounding.
 
-use super::differ::Features;
+use super::Rules;
+use super::differ::{Features, Fired};
+use super::overlap::Facet;
+use super::window::PathTile;
 use crate::sample::NodePath;
 
 /// What orders nodes along the line of sight: explicit priority first, then the shorter depth.
@@ -69,6 +72,28 @@ pub(super) struct LineNode {
     pub rank: Rank,
     /// Square of the radius of its line ([`super::Rules::radius`]), 0 if it draws none.
     pub radius_squared: f32,
+}
+
+/// Which tests find a difference between a target and a neighbour, each with its tile and row: those of the priority
+/// sample's material decide (DESIGN section 3.2).
+pub(super) fn fired(
+    rules: &Rules,
+    (targets, row, t): (&PathTile<'_>, usize, &LineNode),
+    (neighbors, neighbor, n): (&PathTile<'_>, usize, &LineNode),
+) -> Fired {
+    let own = !n.rank.outranks(t.rank);
+    let tests = rules.tests_of(if own { &t.features } else { &n.features }.shader);
+    let mut fired = tests.fired(&t.features, &n.features);
+    if tests.reads_facets() && t.features.object == n.features.object && !t.features.is_miss() {
+        let distance_squared = distance_squared(t, n.pixel, n.offset);
+        let overlaps = Facet::of(targets.nodes, row).overlaps(
+            &Facet::of(neighbors.nodes, neighbor),
+            distance_squared,
+            tests.overlap,
+        );
+        fired.set(Fired::OVERLAP, overlaps);
+    }
+    fired
 }
 
 /// The squared distance on the film from a target to a neighbour, in square pixels.

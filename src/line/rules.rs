@@ -1,9 +1,10 @@
 //! Line settings, made ready for a sample rate.
 
 use super::differ::Tests;
+use super::materials::MaterialTests;
 use crate::math::portable;
 use crate::sample::NodePath;
-use crate::scene::settings::{LineSettings, RayKinds};
+use crate::scene::settings::{LineOverrides, LineSettings, RayKinds};
 
 /// [`LineSettings`] with all that follows from them and the sample rate worked out once.
 #[derive(Clone, Debug, PartialEq)]
@@ -13,7 +14,9 @@ pub struct Rules {
     widest: f32,
     /// Mean gap to the nearest sample beyond an edge, for a half width of 1 px.
     unit_gap: f64,
+    /// The loosest tests of any material.
     tests: Tests,
+    materials: Option<MaterialTests>,
     exact_pairs: bool,
     hidden: Option<HiddenStyle>,
 }
@@ -50,6 +53,7 @@ impl Rules {
             widest: settings.max_width.max(0.0),
             unit_gap: f64::from(unit_gap),
             tests: Tests::new(settings),
+            materials: None,
             exact_pairs: true,
             hidden: None,
             settings: settings.clone(),
@@ -58,7 +62,11 @@ impl Rules {
             color: hidden.color.to_array(),
             radius_squared: rules.radius(hidden.width) * rules.radius(hidden.width),
             alpha: rules.alpha(hidden.width),
-            objects: hidden.objects.as_ref().map(|objects| objects.iter().map(|id| id.0 + 1).collect()),
+            objects: hidden.objects.as_ref().map(|objects| {
+                let mut ids: Vec<u32> = objects.iter().map(|id| id.0 + 1).collect();
+                ids.sort_unstable();
+                ids
+            }),
         });
         rules
     }
@@ -68,6 +76,17 @@ impl Rules {
     #[must_use]
     pub fn with_widest(mut self, width: f32) -> Self {
         self.widest = self.widest.min(width.max(0.0));
+        self
+    }
+
+    /// The same rules with what each material changes about the tests, in the order of their ids.
+    #[must_use]
+    pub fn with_materials(mut self, overrides: &[LineOverrides]) -> Self {
+        self.materials = MaterialTests::new(&self.settings, overrides);
+        self.tests = match &self.materials {
+            Some(materials) => materials.loosest(&[[0, u32::MAX]]),
+            None => Tests::new(&self.settings),
+        };
         self
     }
 
@@ -105,8 +124,31 @@ impl Rules {
         self.widest
     }
 
+    /// Whoever styles the line, nothing differs that these find alike.
     pub(super) fn tests(&self) -> &Tests {
         &self.tests
+    }
+
+    /// The tests of pairs that a material styles, by its `shader` value.
+    #[inline]
+    pub(super) fn tests_of(&self, shader: u32) -> &Tests {
+        match &self.materials {
+            None => &self.tests,
+            Some(materials) => materials.of(shader),
+        }
+    }
+
+    /// The settings that hold for lines that a material styles.
+    pub(super) fn settings_of(&self, shader: u32) -> LineSettings {
+        match &self.materials {
+            None => self.settings.clone(),
+            Some(materials) => materials.overrides_of(shader).over(&self.settings),
+        }
+    }
+
+    /// The tests by material, if they are not the same for all.
+    pub(super) fn materials(&self) -> Option<&MaterialTests> {
+        self.materials.as_ref()
     }
 
     /// The half width within which a neighbour makes a line of this full width visible: half the effective width,

@@ -28,7 +28,9 @@
 
 use super::bounds::{Block, Bounded, PathBounds, PixelNodes, Stylist};
 use super::differ::Tests;
-use super::lanes::{Lanes, Origin};
+use super::lanes::{LaneTarget, Lanes, Origin};
+use super::materials::{certainty, may_differ, may_matter};
+use super::overlap::Facet;
 use super::pair::{Found, LineNode, MOST_LINES, Pair, Rank, Taken, distance_squared};
 use super::window::{LineStyle, PathTile, PathWindow};
 use super::{LineCounts, Rules};
@@ -111,12 +113,17 @@ struct Candidate<'w> {
 struct Target {
     row: usize,
     node: LineNode,
+    facet: Facet,
     style: LineStyle,
     opaque: bool,
     best: Option<Pair>,
 }
 
 impl Target {
+    fn lane(&self) -> LaneTarget<'_> {
+        LaneTarget { node: &self.node, facet: &self.facet }
+    }
+
     /// Whether a neighbour of this rank may outrank the target and all that was found so far.
     #[inline(always)]
     fn may_win(&self, rank: Rank) -> bool {
@@ -170,7 +177,7 @@ impl<'w> Search<'w, '_> {
     fn collect_tiles(&mut self, targets: &PathTile<'_>, reach: i32) {
         let bounded = targets.bounds.bounded();
         for (index, tile) in self.window.tiles_in(targets.buffer.rect.grown(reach)) {
-            if bounded.may_differ(&tile.bounds.bounded(), self.tests) {
+            if may_differ(self.rules, &bounded, &tile.bounds.bounded(), 0.0) {
                 self.tiles.push((index as u32, tile));
             }
         }
@@ -182,7 +189,7 @@ impl<'w> Search<'w, '_> {
             let bounds: &'w PathBounds = nodes.bounds;
             for block in &bounds.blocks {
                 let gap_squared = rect_gap_squared(&targets.rect, &block.rect);
-                if may_matter(&targets.bounded(), &block.bounded(), gap_squared, self.tests) {
+                if may_matter(self.rules, &targets.bounded(), &block.bounded(), gap_squared) {
                     self.near_block.push(Near { tile, bounds, block, gap_squared });
                 }
             }
@@ -198,7 +205,7 @@ impl<'w> Search<'w, '_> {
         let rect = pixel_rect(pixel.pixel);
         for near in &self.near_block {
             let gap_squared = rect_gap_squared(&rect, &near.block.rect);
-            if may_matter(&bounded, &near.block.bounded(), gap_squared, self.tests) {
+            if may_matter(self.rules, &bounded, &near.block.bounded(), gap_squared) {
                 self.near_pixel.push(Near { gap_squared, ..*near });
             }
         }
@@ -212,7 +219,8 @@ impl<'w> Search<'w, '_> {
             let node = nodes.node(pixel.pixel, row);
             self.targets.push({
                 let style = nodes.style(row);
-                Target { row, node, style, opaque: style.is_opaque(self.rules), best: None }
+                let facet = if self.tests.reads_facets() { Facet::of(nodes.nodes, row) } else { Facet::NONE };
+                Target { row, node, facet, style, opaque: style.is_opaque(self.rules), best: None }
             });
         }
         self.search_others(pixel.pixel, &bounded);
@@ -298,9 +306,9 @@ impl<'w> Search<'w, '_> {
             for target in targets.iter_mut() {
                 if target.may_win(first) && !self.is_settled(target, style) {
                     self.pairs_tested += self.lanes.len() as u64;
-                    let score = self.lanes.score_others(&target.node, self.tests);
+                    let score = self.lanes.score_others(target.lane(), self.rules);
                     for origin in self.lanes.with_score(score) {
-                        keep(self.window, self.tests, target, origin);
+                        keep(self.window, self.rules, target, origin);
                     }
                 }
             }
@@ -315,7 +323,7 @@ impl<'w> Search<'w, '_> {
         for row in neighbors.first..neighbors.end {
             let rank = nodes.rank(row as usize);
             if wanted(rank, nodes.bounds.radius_squared.get(row as usize)) {
-                self.lanes.push(Origin { tile, pixel: neighbors.pixel, row }, pixel, rank, nodes, self.tests);
+                self.lanes.push(Origin { tile, pixel: neighbors.pixel, row }, pixel, rank, nodes, self.rules);
             }
         }
     }
@@ -344,10 +352,10 @@ impl<'w> Search<'w, '_> {
                     continue;
                 }
                 let bounded = bounds.of_pixel(place as usize);
-                if !targets.may_differ(&bounded, self.tests) {
+                // Their materials decide.
+                let Some(certain) = certainty(self.rules, targets, &bounded, gap_squared, bounded.bounds) else {
                     continue;
-                }
-                let certain = targets.must_differ(&bounded, self.tests);
+                };
                 self.candidates.push(Candidate { tile, pixel: neighbors, gap_squared, certain });
                 if certain
                     && neighbors.bounds.best.outranks(targets.bounds.highest)
@@ -408,9 +416,9 @@ impl<'w> Search<'w, '_> {
                 for target in targets.iter_mut().filter(open) {
                     if !target.too_far(first) {
                         self.pairs_tested += self.lanes.len() as u64;
-                        let score = self.lanes.score_own(&target.node, self.tests);
+                        let score = self.lanes.score_own(target.lane(), self.rules);
                         for origin in self.lanes.with_score(score) {
-                            keep(self.window, self.tests, target, origin);
+                            keep(self.window, self.rules, target, origin);
                         }
                     }
                     if open(&target) {
@@ -444,10 +452,10 @@ impl<'w> Search<'w, '_> {
                     continue;
                 }
                 let bounded = bounds.of_pixel(place as usize);
-                if !targets.may_differ(&bounded, self.tests) {
+                // The targets' materials decide.
+                let Some(certain) = certainty(self.rules, targets, &bounded, gap_squared, targets.bounds) else {
                     continue;
-                }
-                let certain = targets.must_differ(&bounded, self.tests);
+                };
                 self.candidates.push(Candidate { tile, pixel: neighbors, gap_squared, certain });
                 let far_squared = far_squared(pixel, neighbors.pixel);
                 if certain && far_squared < own.limit.min(own.thinnest) && !neighbors.bounds.lowest.outranks(own.lowest)
@@ -485,7 +493,7 @@ impl<'w> Search<'w, '_> {
                 for place in near.block.first as usize..near.block.end as usize {
                     let pixel = &near.bounds.pixels[place];
                     let gap_squared = pixel_gap_squared(target.node.pixel, pixel.pixel);
-                    if !may_matter(&bounded, &near.bounds.of_pixel(place), gap_squared, self.tests)
+                    if !may_matter(self.rules, &bounded, &near.bounds.of_pixel(place), gap_squared)
                         || target.best.is_some_and(|best| {
                             best.rank.outranks(pixel.bounds.best) && (!best.own || gap_squared > best.distance_squared)
                         })
@@ -497,7 +505,7 @@ impl<'w> Search<'w, '_> {
                         let own = !tile.rank(row as usize).outranks(target.node.rank);
                         if !taken.contains(&tile.features(row as usize), own) {
                             let origin = Origin { tile: near.tile, pixel: pixel.pixel, row };
-                            keep(self.window, self.tests, target, &origin);
+                            keep(self.window, self.rules, target, &origin);
                         }
                     }
                 }
@@ -513,12 +521,12 @@ impl<'w> Search<'w, '_> {
     fn test_again(&mut self, target: &mut Target, pair: &Pair) {
         self.pairs_tested += 1;
         let origin = Origin { tile: pair.tile, pixel: pair.pixel, row: pair.row };
-        keep(self.window, self.tests, target, &origin);
+        keep(self.window, self.rules, target, &origin);
     }
 }
 
 /// Keeps a pair if it is valid and beats the best.
-fn keep(window: &PathWindow<'_>, tests: &Tests, target: &mut Target, origin: &Origin) {
+fn keep(window: &PathWindow<'_>, rules: &Rules, target: &mut Target, origin: &Origin) {
     let Origin { tile, pixel, row } = *origin;
     let Some(nodes) = &window.tiles[tile as usize] else { return };
     let t = &target.node;
@@ -531,7 +539,18 @@ fn keep(window: &PathWindow<'_>, tests: &Tests, target: &mut Target, origin: &Or
         return;
     }
     let pair = Pair { rank, distance_squared, pixel, tile, row, surface: 0, own };
-    if target.best.is_none_or(|best| pair.beats(&best)) && tests.differ(&t.features, &nodes.features(row as usize)) {
+    if !target.best.is_none_or(|best| pair.beats(&best)) {
+        return;
+    }
+    // As `pair::fired`.
+    let n = nodes.features(row as usize);
+    let tests = rules.tests_of(if own { t.features.shader } else { n.shader });
+    let overlaps = || {
+        t.features.object == n.object
+            && !n.is_miss()
+            && target.facet.overlaps(&Facet::of(nodes.nodes, row as usize), distance_squared, tests.overlap)
+    };
+    if tests.differ(&t.features, &n) || (tests.reads_facets() && overlaps()) {
         target.best = Some(pair);
     }
 }
@@ -545,13 +564,6 @@ struct OwnTargets {
     thinnest: f32,
     /// The squared distance within which each is sure to find its line, if it has one.
     limit: f32,
-}
-
-/// Whether targets and neighbours at least this far apart may make lines.
-#[inline]
-fn may_matter(targets: &Bounded<'_>, neighbors: &Bounded<'_>, gap_squared: f32, tests: &Tests) -> bool {
-    let near = gap_squared < targets.bounds.radius_squared.max(neighbors.bounds.radius_squared);
-    near && targets.may_differ(neighbors, tests)
 }
 
 /// The smallest squared distance that [`distance_squared`] can give between a target in one rectangle and a neighbour in

@@ -1,9 +1,9 @@
 //! How a seen line colours its sample (DESIGN sections 3.2 and 3.3; OG18 sections 3.4 and 3.5).
 
 use super::differ::Fired;
-use super::pair::Found;
-use super::window::{PathTile, PathWindow, alpha, features};
-use super::{LineType, Rules, SeenLine};
+use super::pair::{Found, fired};
+use super::window::{PathTile, PathWindow, alpha};
+use super::{LineType, Rules, SeenLine, list};
 use crate::math::{Vec3, luminance};
 use crate::scene::settings::Composition;
 
@@ -14,6 +14,7 @@ impl LineType {
         [
             (Fired::MISS, Self::Outline),
             (Fired::OBJECT, Self::Silhouette),
+            (Fired::OVERLAP, Self::Overlap),
             (Fired::SHADER, Self::Material),
             (Fired::NORMAL, Self::Crease),
             (Fired::UV, Self::Uv),
@@ -63,17 +64,21 @@ pub(super) fn style(window: &PathWindow<'_>, targets: &PathTile<'_>, found: &Fou
     let pair = &found.pair;
     let neighbors = window.tiles[pair.tile as usize].as_ref()?;
     let spp = neighbors.buffer.samples_per_pixel;
-    // The two sides: the surface that styles the line, and the first surface of the other sample.
-    let (mine, theirs) = if pair.own { (pair.surface, 0) } else { (0, pair.surface) };
-    let (mine, my_row) = targets.surface(found.row, mine)?;
-    let (theirs, their_row) = neighbors.surface(pair.row as usize, theirs)?;
+    let fired = if rules.surfaces() > 1 {
+        list::fired(rules, targets, found, neighbors)?
+    } else {
+        let target = targets.node(targets.buffer.pixel_of(sample), found.row);
+        let row = pair.row as usize;
+        let neighbor = neighbors.node(pair.pixel, row);
+        fired(rules, (targets, found.row, &target), (neighbors, row, &neighbor))
+    };
     Some(SeenLine {
         color: color.to_array(),
         alpha: covered,
         lined: lined.to_array(),
         path: found.path,
         hidden: found.hidden,
-        fired: rules.tests().fired(&features(mine, my_row), &features(theirs, their_row)),
+        fired,
         neighbor: (pair.pixel, neighbors.nodes.rows.sample(pair.row as usize) % spp),
         own: pair.own,
     })

@@ -152,7 +152,7 @@ impl<'a> PathTile<'a> {
         let Some(behind) = (place as usize).checked_sub(1) else { return Some((self.nodes, row)) };
         let behind = self.nodes.behind.get(behind)?;
         let sample = self.nodes.rows.sample(row);
-        Some((behind, behind.row_of((sample / self.buffer.samples_per_pixel) as usize, sample)?))
+        Some((behind, behind.row_in_pixel((sample / self.buffer.samples_per_pixel) as usize, sample)?))
     }
 
     #[inline(always)]

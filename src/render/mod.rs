@@ -8,6 +8,7 @@
 mod files;
 mod grid;
 pub mod stats;
+pub mod why;
 
 pub use files::{PictureFile, layers_of, render_files};
 

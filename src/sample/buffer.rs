@@ -200,8 +200,10 @@ pub struct SampleColor {
 /// One node, as the tracer hands it to the builder.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Node {
-    /// 1 + object id; 0 is a miss.
+    /// 1 + object id; 0 is a miss. Objects of a group share the id of the group's first.
     pub object: u32,
+    /// 1 + id of the object itself, where `object` is that of its group; may be 0 where they are the same.
+    pub member: u32,
     /// 1 + material id; 0 is a miss.
     pub shader: u32,
     /// Texture coordinates.
@@ -220,6 +222,12 @@ pub struct Node {
     pub line_opacity: f32,
     /// Line priority.
     pub priority: i32,
+    /// Position relative to the camera's (world space).
+    pub position: [f32; 3],
+    /// Unit normal of the triangle, on the side that is seen (world space).
+    pub geometric_normal: [f32; 3],
+    /// Width of a pixel where its ray arrives, in world units, ≥ 0.
+    pub footprint: f32,
     /// Product of the weights along the path from the camera, 1 at the camera.
     pub throughput: [f32; 3],
     /// What this node and its subtree add to the sample's colour (throughput included).
@@ -231,6 +239,7 @@ impl Default for Node {
     fn default() -> Self {
         Self {
             object: 0,
+            member: 0,
             shader: 0,
             uv: [0.0; 2],
             normal: [0.0, 0.0, 1.0],
@@ -241,6 +250,9 @@ impl Default for Node {
             line_opacity: 1.0,
             // A miss never decides a line's style, whatever the objects' priorities.
             priority: i32::MIN,
+            position: [0.0; 3],
+            geometric_normal: [0.0, 0.0, 1.0],
+            footprint: 0.0,
             throughput: [1.0; 3],
             contribution: [0.0; 3],
         }
@@ -260,6 +272,10 @@ pub struct NodeColumnSet {
     pub depth: bool,
     /// Lines are on: line colour, line width, line opacity, priority.
     pub lines: bool,
+    /// Objects share groups, and somebody asks which object it is: `member`.
+    pub member: bool,
+    /// The overlap test is on: position, geometric normal, footprint.
+    pub overlap: bool,
     /// Tint or throughput composition is on and there are secondary paths.
     pub throughput: bool,
     /// Throughput composition is on.
@@ -268,8 +284,17 @@ pub struct NodeColumnSet {
 
 impl NodeColumnSet {
     /// Every column.
-    pub const ALL: Self =
-        Self { uv: true, normal: true, feature: true, depth: true, lines: true, throughput: true, contribution: true };
+    pub const ALL: Self = Self {
+        uv: true,
+        normal: true,
+        feature: true,
+        depth: true,
+        lines: true,
+        member: true,
+        overlap: true,
+        throughput: true,
+        contribution: true,
+    };
 }
 
 /// All nodes at one path, in the order of their samples.
@@ -279,8 +304,10 @@ pub struct NodeColumns {
     pub path: NodePath,
     /// The sample of each row.
     pub rows: Rows,
-    /// 1 + object id; 0 is a miss.
+    /// 1 + object id; 0 is a miss. Objects of a group share the id of the group's first.
     pub object: Column<u32>,
+    /// 1 + id of the object itself, or 0 where that is `object`: see [`Self::object_itself`].
+    pub member: Column<u32>,
     /// 1 + material id; 0 is a miss.
     pub shader: Column<u32>,
     /// Texture coordinates.
@@ -299,6 +326,12 @@ pub struct NodeColumns {
     pub line_opacity: Column<f32>,
     /// Line priorities.
     pub priority: Column<i32>,
+    /// Positions relative to the camera's.
+    pub position: Column<[f32; 3]>,
+    /// Unit normals of the triangles.
+    pub geometric_normal: Column<[f32; 3]>,
+    /// Widths of a pixel in world units.
+    pub footprint: Column<f32>,
     /// Path throughputs.
     pub throughput: Column<[f32; 3]>,
     /// Subtree contributions.
@@ -333,11 +366,30 @@ pub struct SampleBuffer {
 }
 
 impl NodeColumns {
+    /// 1 + id of the object at a row, whatever its group; 0 is a miss.
+    #[must_use]
+    pub fn object_itself(&self, row: usize) -> u32 {
+        match self.member.get(row) {
+            0 => self.object.get(row),
+            member => member,
+        }
+    }
+
+    /// The row of a sample, if it has a node here.
+    #[must_use]
+    pub fn row_of(&self, sample: u32) -> Option<usize> {
+        match &self.rows {
+            Rows::Every { samples, .. } => (sample < *samples).then_some(sample as usize),
+            Rows::Some { sample: samples, .. } => samples.binary_search(&sample).ok(),
+        }
+    }
+
     /// Bytes of heap memory.
     #[must_use]
     pub fn bytes(&self) -> usize {
         self.rows.bytes()
             + self.object.bytes()
+            + self.member.bytes()
             + self.shader.bytes()
             + self.uv.bytes()
             + self.normal.bytes()
@@ -347,6 +399,9 @@ impl NodeColumns {
             + self.line_width.bytes()
             + self.line_opacity.bytes()
             + self.priority.bytes()
+            + self.position.bytes()
+            + self.geometric_normal.bytes()
+            + self.footprint.bytes()
             + self.throughput.bytes()
             + self.contribution.bytes()
             + self.behind.iter().map(|behind| size_of::<Self>() + behind.bytes()).sum::<usize>()
@@ -355,7 +410,7 @@ impl NodeColumns {
     /// The row of a sample in a pixel (by its number in the rectangle), if it has one.
     #[inline]
     #[must_use]
-    pub fn row_of(&self, pixel: usize, sample: u32) -> Option<usize> {
+    pub fn row_in_pixel(&self, pixel: usize, sample: u32) -> Option<usize> {
         match &self.rows {
             Rows::Every { .. } => Some(sample as usize),
             Rows::Some { first, sample: samples } => {

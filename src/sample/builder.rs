@@ -122,7 +122,7 @@ impl SampleBufferBuilder {
         if node.object == 0 {
             return;
         }
-        let kept = NodeColumnSet { throughput: false, contribution: false, ..self.layout.columns };
+        let kept = NodeColumnSet { member: false, throughput: false, contribution: false, ..self.layout.columns };
         let (node, faults) = clean_node(node, kept, self.layout.max_width_of(node.shader));
         self.gate.note(path, sample, node.shader, faults);
         let place = self.behind.iter().position(|(rows, of)| *of == surface && rows.path == path);
@@ -163,7 +163,7 @@ impl SampleBufferBuilder {
             if front.behind.len() + 1 == surface {
                 let before = front.behind.last().unwrap_or(front);
                 let behind = rows.finish(&self.rect, per_pixel, |sample| {
-                    let row = before.row_of((sample / per_pixel) as usize, sample);
+                    let row = before.row_in_pixel((sample / per_pixel) as usize, sample);
                     row.is_some_and(|row| before.object.get(row) != 0)
                 });
                 if !behind.rows.is_empty() {
@@ -212,6 +212,7 @@ struct PathRows {
     rising: bool,
     sample: Vec<u32>,
     object: Column<u32>,
+    member: Column<u32>,
     shader: Column<u32>,
     uv: Column<[f32; 2]>,
     normal: Column<[f32; 3]>,
@@ -221,6 +222,9 @@ struct PathRows {
     line_width: Column<f32>,
     line_opacity: Column<f32>,
     priority: Column<i32>,
+    position: Column<[f32; 3]>,
+    geometric_normal: Column<[f32; 3]>,
+    footprint: Column<f32>,
     throughput: Column<[f32; 3]>,
     contribution: Column<[f32; 3]>,
 }
@@ -234,6 +238,7 @@ impl PathRows {
             rising: true,
             sample: Vec::with_capacity(expected),
             object: Column::Constant(neutral.object),
+            member: Column::Constant(neutral.member),
             shader: Column::Constant(neutral.shader),
             uv: Column::Constant(neutral.uv),
             normal: Column::Constant(neutral.normal),
@@ -243,6 +248,9 @@ impl PathRows {
             line_width: Column::Constant(neutral.line_width),
             line_opacity: Column::Constant(neutral.line_opacity),
             priority: Column::Constant(neutral.priority),
+            position: Column::Constant(neutral.position),
+            geometric_normal: Column::Constant(neutral.geometric_normal),
+            footprint: Column::Constant(neutral.footprint),
             throughput: Column::Constant(neutral.throughput),
             contribution: Column::Constant(neutral.contribution),
         }
@@ -271,6 +279,14 @@ impl PathRows {
             self.line_width.push(row, node.line_width, expected);
             self.line_opacity.push(row, node.line_opacity, expected);
             self.priority.push(row, node.priority, expected);
+        }
+        if kept.member {
+            self.member.push(row, node.member, expected);
+        }
+        if kept.overlap {
+            self.position.push(row, node.position, expected);
+            self.geometric_normal.push(row, node.geometric_normal, expected);
+            self.footprint.push(row, node.footprint, expected);
         }
         if kept.throughput {
             self.throughput.push(row, node.throughput, expected);
@@ -312,6 +328,7 @@ impl PathRows {
             path: self.path,
             rows,
             object: self.object.ordered(order),
+            member: self.member.ordered(order),
             shader: self.shader.ordered(order),
             uv: self.uv.ordered(order),
             normal: self.normal.ordered(order),
@@ -321,6 +338,9 @@ impl PathRows {
             line_width: self.line_width.ordered(order),
             line_opacity: self.line_opacity.ordered(order),
             priority: self.priority.ordered(order),
+            position: self.position.ordered(order),
+            geometric_normal: self.geometric_normal.ordered(order),
+            footprint: self.footprint.ordered(order),
             throughput: self.throughput.ordered(order),
             contribution: self.contribution.ordered(order),
             behind: Vec::new(),

@@ -1,6 +1,6 @@
 //! The gate: the one place where NaN, infinity and absurd numbers from scripts are stopped (DESIGN section 3.7).
 //!
-//! Neutral values: a component of a colour, feature, uv, position, throughput, contribution or AOV that is NaN or
+//! Neutral values: a component of a colour, feature, uv, position, throughput, contribution or AOV, or a footprint, that is NaN or
 //! infinite becomes 0; a width that is NaN, infinite or negative becomes 0 (no line); a width above the largest is
 //! clamped to it; an opacity that is NaN or infinite becomes 0 (no line), any other is clamped to 0 … 1; a normal that is not finite or has no length becomes +Z, any other is brought to unit length; the
 //! depth of a hit that is not finite becomes the largest finite number. What is stopped is counted by material, once per
@@ -127,6 +127,11 @@ pub(super) fn clean_node(node: Node, kept: NodeColumnSet, max_width: f32) -> (No
         node.line_color = faults.numbers(node.line_color);
         node.line_width = faults.width(node.line_width, max_width);
         node.line_opacity = faults.number(node.line_opacity).clamp(0.0, 1.0);
+    }
+    if kept.overlap {
+        node.position = faults.numbers(node.position);
+        node.geometric_normal = faults.normal(node.geometric_normal);
+        node.footprint = faults.number(node.footprint).abs();
     }
     if kept.throughput {
         node.throughput = faults.numbers(node.throughput);

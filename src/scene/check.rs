@@ -108,11 +108,19 @@ fn check_settings(scene: &SceneBuilder, faults: &mut Diagnostics) {
             require(false, format!("hidden lines are asked of {id}, which is not there"));
         }
     }
-    for (name, threshold) in [("uv", lines.uv), ("normal", lines.normal), ("feature", lines.feature)] {
-        require(
-            threshold.is_none_or(|t| t.is_finite() && t >= 0.0),
-            format!("the threshold of the {name} test must be a finite number, 0 or more"),
-        );
+    let overridden = scene.materials.iter().map(|material| {
+        let settings = material.lines.over(lines);
+        (format!(" of material `{}`", material.name), settings)
+    });
+    for (whose, lines) in std::iter::once((String::new(), lines.clone())).chain(overridden) {
+        let thresholds =
+            [("uv", lines.uv), ("normal", lines.normal), ("feature", lines.feature), ("overlap", lines.overlap)];
+        for (name, threshold) in thresholds {
+            require(
+                threshold.is_none_or(|t| t.is_finite() && t >= 0.0),
+                format!("the threshold of the {name} test{whose} must be a finite number, 0 or more"),
+            );
+        }
     }
 }
 

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::ids::{ScriptId, TextureId};
+use super::settings::LineOverrides;
 use super::texture::TextureRef;
 use crate::diag::{Source, Span};
 use crate::math::{Vec2, Vec3, Vec4};
@@ -76,6 +77,8 @@ pub struct Material {
     /// Whether surfaces are seen from behind. Single-sided surfaces are invisible from behind to camera, reflection
     /// and refraction rays, but cast shadows.
     pub double_sided: bool,
+    /// What it changes about the line tests.
+    pub lines: LineOverrides,
     /// Where it was declared.
     pub span: Option<Span>,
 }

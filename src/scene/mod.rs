@@ -19,6 +19,7 @@ pub mod settings;
 pub mod shape;
 pub mod texture;
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use crate::diag::{Diagnostic, Diagnostics, Span};
@@ -47,8 +48,12 @@ pub struct Object {
     pub priority: Option<i32>,
     /// Which rays meet it.
     pub visible_to: RayKinds,
-    /// Whether its surfaces draw lines.
+    /// Whether its surfaces draw lines. If not, all lines that its attributes would style are missing: its outline, its
+    /// own creases, and its border with whatever it outranks. What outranks it still draws its line at their border, on
+    /// both sides of it.
     pub lines: bool,
+    /// Objects of one group compare as one in the object test: no line is drawn where they meet or cover each other.
+    pub group: Option<String>,
     /// Where it was declared.
     pub span: Option<Span>,
 }
@@ -84,6 +89,22 @@ impl Scene {
     #[must_use]
     pub fn objects(&self) -> &[Object] {
         &self.parts.objects
+    }
+
+    /// For each object the one that stands for it in the object test: the first of its group, or itself. Empty if no two
+    /// objects share a group.
+    #[must_use]
+    pub fn stand_ins(&self) -> Vec<ObjectId> {
+        let mut first: BTreeMap<&str, ObjectId> = BTreeMap::new();
+        let mut shared = false;
+        let mut stand_ins = Vec::with_capacity(self.objects().len());
+        for (index, object) in self.objects().iter().enumerate() {
+            let own = ObjectId::from_index(index);
+            let stand_in = object.group.as_deref().map_or(own, |group| *first.entry(group).or_insert(own));
+            shared |= stand_in != own;
+            stand_ins.push(stand_in);
+        }
+        if shared { stand_ins } else { Vec::new() }
     }
 
     /// All meshes; `MeshId` is the index.

@@ -97,6 +97,44 @@ bitflags! {
     }
 }
 
+/// What kind of feature a line marks (DESIGN section 3.6), by the strongest reason, in this order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum LineType {
+    /// One side is a miss.
+    Outline,
+    /// The objects differ.
+    Silhouette,
+    /// The object folds over itself.
+    Overlap,
+    /// The materials differ.
+    Material,
+    /// The normals differ.
+    Crease,
+    /// The texture coordinates differ.
+    Uv,
+    /// The feature colours differ.
+    Feature,
+}
+
+impl LineType {
+    /// All of them, the strongest reason first.
+    pub const ALL: [Self; 6] = [Self::Outline, Self::Silhouette, Self::Material, Self::Crease, Self::Uv, Self::Feature];
+
+    /// As layers, scene files and scripts call it.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Outline => "outline",
+            Self::Silhouette => "silhouette",
+            Self::Overlap => "overlap",
+            Self::Material => "material",
+            Self::Crease => "crease",
+            Self::Uv => "uv",
+            Self::Feature => "feature",
+        }
+    }
+}
+
 /// How a line at a reflected or refracted node enters the sample's colour.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Composition {
@@ -131,6 +169,8 @@ pub struct LineSettings {
     pub normal: Option<f32>,
     /// Where any channel of the feature colours differs by more than this.
     pub feature: Option<f32>,
+    /// Where an object folds over itself by more than this many pixels per pixel of the picture.
+    pub overlap: Option<f32>,
     /// Which paths draw lines; `SHADOW` is not among them.
     pub paths: RayKinds,
     /// Whether lines in reflections and refractions take the path's throughput as tint.
@@ -150,7 +190,7 @@ pub struct HiddenLines {
     pub color: Vec3,
     /// Full width in pixels; 0 is no line.
     pub width: f32,
-    /// The objects whose hidden lines are drawn, rising; `None` for all.
+    /// The objects whose hidden lines are drawn, each with its group; `None` for all.
     pub objects: Option<Vec<ObjectId>>,
 }
 
@@ -168,11 +208,61 @@ impl Default for LineSettings {
             uv: None,
             normal: None,
             feature: None,
+            overlap: None,
             paths: RayKinds::CAMERA.union(RayKinds::REFLECTION).union(RayKinds::REFRACTION),
             tint: true,
             compose: Composition::Replace,
             surfaces: 1,
             hidden: None,
+        }
+    }
+}
+
+impl LineSettings {
+    /// Whether a test is on that reads more than objects and materials.
+    #[must_use]
+    pub fn tests_shapes(&self) -> bool {
+        self.uv.is_some() || self.normal.is_some() || self.feature.is_some() || self.overlap.is_some()
+    }
+
+    /// Whether any test is on.
+    #[must_use]
+    pub fn tests_anything(&self) -> bool {
+        self.object || self.shader || self.tests_shapes()
+    }
+}
+
+/// `[materials.NAME.lines]`: what a material changes about the tests of `[lines]`; `None` leaves it. A pair of samples is
+/// tested as the material of the one whose line attributes style the line says (DESIGN section 3.2: the larger priority,
+/// else the shorter depth, else the target).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct LineOverrides {
+    /// [`LineSettings::object`].
+    pub object: Option<bool>,
+    /// [`LineSettings::shader`].
+    pub shader: Option<bool>,
+    /// [`LineSettings::uv`]; `Some(None)` is off.
+    pub uv: Option<Option<f32>>,
+    /// [`LineSettings::normal`]; `Some(None)` is off.
+    pub normal: Option<Option<f32>>,
+    /// [`LineSettings::feature`]; `Some(None)` is off.
+    pub feature: Option<Option<f32>>,
+    /// [`LineSettings::overlap`]; `Some(None)` is off.
+    pub overlap: Option<Option<f32>>,
+}
+
+impl LineOverrides {
+    /// The settings with these changes.
+    #[must_use]
+    pub fn over(&self, settings: &LineSettings) -> LineSettings {
+        LineSettings {
+            object: self.object.unwrap_or(settings.object),
+            shader: self.shader.unwrap_or(settings.shader),
+            uv: self.uv.unwrap_or(settings.uv),
+            normal: self.normal.unwrap_or(settings.normal),
+            feature: self.feature.unwrap_or(settings.feature),
+            overlap: self.overlap.unwrap_or(settings.overlap),
+            ..settings.clone()
         }
     }
 }

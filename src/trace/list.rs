@@ -4,9 +4,9 @@
 //! only what the line pass asks for is worked out: the slice of their shaders for feature, line and opacity.
 //!
 //! What a list holds must serve `differ`, which compares surfaces, not crossings. While only objects and materials are
-//! compared, a second crossing of an object with the same material can tell nothing new: it is left out, so that a closed
-//! body takes one place and not two. Where a test reads texture coordinates, normals or feature colours, the far side of a
-//! body may differ from its near side, and each crossing has its place. Two triangles that share the edge that a ray hits
+//! compared, a second crossing of an object (or group) with the same material can tell nothing new: it is left out, so that a closed
+//! body takes one place and not two. Where a test reads texture coordinates, normals, feature colours or overlaps, the far
+//! side of a body may differ from its near side, and each crossing has its place. Two triangles that share the edge that a ray hits
 //! exactly, at one distance, are one crossing either way.
 //!
 //! A surface of opacity 0 is not there. That is known only once it is shaded, so a list that turns out to hold one is
@@ -58,15 +58,15 @@ impl TileTracer<'_> {
         absent: &[HitRank],
         list: &mut Vec<Hit>,
     ) {
-        let lines = self.scene.lines();
-        let shapes = lines.uv.is_some() || lines.normal.is_some() || lines.feature.is_some();
+        let Some(tests) = self.plan.lines.as_ref().map(|lines| &lines.tests) else { return };
+        let shapes = tests.tests_shapes();
+        let object = |hit: &Hit| self.stand_ins.get(hit.object.index()).copied().unwrap_or(hit.object);
         let same = |a: &Hit, b: &Hit| {
-            let same_object = a.object == b.object;
             let same_material = || self.world.material(a) == self.world.material(b);
             if shapes {
-                same_object && a.t == b.t && a.front == b.front && same_material()
+                a.object == b.object && a.t == b.t && a.front == b.front && same_material()
             } else {
-                (!lines.object || same_object) && (!lines.shader || same_material())
+                (!tests.object || object(a) == object(b)) && (!tests.shader || same_material())
             }
         };
         let from = (wave_ray.after, absent);
@@ -151,7 +151,8 @@ impl TileTracer<'_> {
         for (index, hit) in group.iter().enumerate() {
             let outputs = Outputs { batch, row: if constant { 0 } else { index } };
             let opacity = unit(value(&batch.opacity, outputs.row, 1.0), 1.0);
-            let found = if opacity == 0.0 { Err(hit.hit.rank()) } else { Ok(self.attributes(hit, outputs)) };
+            let cone = run.nodes[hit.ray.node as usize].cone;
+            let found = if opacity == 0.0 { Err(hit.hit.rank()) } else { Ok(self.attributes(hit, cone, outputs)) };
             shaded.push((hit.ray.node, hit.place, found));
         }
     }

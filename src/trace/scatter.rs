@@ -195,7 +195,7 @@ impl TileTracer<'_> {
         // What the line pass and the layers need.
         let index = hit.ray.node as usize;
         let node = &mut run.nodes[index];
-        node.attributes = Node { throughput: node.attributes.throughput, ..self.attributes(hit, outputs) };
+        node.attributes = Node { throughput: node.attributes.throughput, ..self.attributes(hit, node.cone, outputs) };
         node.culprit = node.attributes.shader;
         node.alpha = if self.transparent { opacity } else { 1.0 };
         if node.path == NodePath::CAMERA {
@@ -256,7 +256,7 @@ impl TileTracer<'_> {
         }
     }
 
-    pub(super) fn attributes(&self, hit: &WaveHit, Outputs { batch, row }: Outputs<'_>) -> Node {
+    pub(super) fn attributes(&self, hit: &WaveHit, cone: Cone, Outputs { batch, row }: Outputs<'_>) -> Node {
         let object = &self.scene.objects()[hit.hit.object.index()];
         let placed = self.world.object(hit.hit.object);
         let lines = self.scene.lines();
@@ -265,9 +265,13 @@ impl TileTracer<'_> {
             .or(object.priority)
             .or(self.scene.materials()[hit.material.index()].priority)
             .unwrap_or(0);
-        let uv = self.plan.layout.columns.uv.then(|| hit.surface.uv(placed, &hit.hit, 0));
+        let columns = self.plan.layout.columns;
+        let uv = columns.uv.then(|| hit.surface.uv(placed, &hit.hit, 0));
+        let stand_in = self.stand_ins.get(hit.hit.object.index()).copied().unwrap_or(hit.hit.object);
+        let footprint = if columns.overlap { cone.after(hit.hit.t).footprint() } else { 0.0 };
         Node {
-            object: hit.hit.object.0 + 1,
+            object: stand_in.0 + 1,
+            member: hit.hit.object.0 + 1,
             shader: hit.material.0 + 1,
             uv: uv.unwrap_or_default().to_array(),
             normal: hit.surface.normal.to_array(),
@@ -277,6 +281,9 @@ impl TileTracer<'_> {
             line_width: if object.lines { width } else { 0.0 },
             line_opacity: value(&batch.line_opacity, row, 1.0),
             priority,
+            position: hit.surface.position.to_array(),
+            geometric_normal: hit.surface.geometric_normal.to_array(),
+            footprint,
             throughput: [1.0; 3],
             contribution: [0.0; 3],
         }

@@ -19,6 +19,7 @@ use crate::plan::{Plan, marker};
 use crate::sample::position::SamplePositions;
 use crate::sample::{PixelRect, SampleBuffer, SampleBufferBuilder, SampleColor};
 use crate::scene::Scene;
+use crate::scene::ids::ObjectId;
 use crate::scene::settings::{Background, RayKinds};
 use crate::shade::batch::{HitBatch, OutputBatch};
 use crate::shade::{InputSet, Lighting, OutputSet, PathKind, ShadeErrors, Shaders, Shading};
@@ -76,9 +77,12 @@ pub struct TileTracer<'a> {
     positions: SamplePositions,
     /// Whether rays that leave the scene let the page show through.
     pub(super) transparent: bool,
+    /// For each object the one that stands for its group; empty if there are no groups.
+    pub(super) stand_ins: Vec<ObjectId>,
     /// A pixel's cone at the camera.
     pub(super) cone: Cone,
-    /// Whether any shader asks how wide a pixel is, so that curved mirrors and glass must be accounted for.
+    /// Whether a shader or the overlap test asks how wide a pixel is, so that curved mirrors and glass must be accounted
+    /// for.
     pub(super) follows_cones: bool,
     /// Outputs that mark a hit whose script failed, which no analysis of the script foresees.
     pub(super) marker: OutputSet,
@@ -130,8 +134,10 @@ impl<'a> TileTracer<'a> {
             lighting,
             positions: SamplePositions::new(settings.samples, settings.seed),
             transparent: settings.background == Background::Transparent,
+            stand_ins: scene.stand_ins(),
             cone: Cone { width, spread: angle },
-            follows_cones: plan.materials.iter().any(|material| material.inputs.intersects(InputSet::CONE)),
+            follows_cones: plan.layout.columns.overlap
+                || plan.materials.iter().any(|material| material.inputs.intersects(InputSet::CONE)),
             marker: marker(plan.color, plan.lines.is_some()),
         }
     }

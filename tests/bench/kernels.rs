@@ -285,6 +285,7 @@ fn scene(name: &str) -> Scene {
         params,
         priority: None,
         double_sided: true,
+        lines: Default::default(),
         span: None,
     });
     builder.build().unwrap_or_else(|faults| panic!("{faults}"))

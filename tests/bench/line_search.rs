@@ -29,6 +29,8 @@ const COLUMNS: NodeColumnSet = NodeColumnSet {
     feature: false,
     depth: true,
     lines: true,
+    member: false,
+    overlap: false,
     throughput: false,
     contribution: false,
 };

@@ -5,7 +5,7 @@ use tusche::line::{LineBuffer, Method, Rules, SeenLine};
 use tusche::math::Vec3;
 use tusche::sample::{HandMadeSample, Node, NodePath, PixelRect, SampleBuffer, SampleColor};
 use tusche::scene::ids::ObjectId;
-use tusche::scene::settings::{Composition, HiddenLines, LineSettings, RayKinds};
+use tusche::scene::settings::{Composition, HiddenLines, LineOverrides, LineSettings, RayKinds};
 
 use super::picture::{Tiles, layout};
 
@@ -24,6 +24,7 @@ struct Case {
     samples_per_pixel: u32,
     tiles: [i32; 2],
     settings: LineSettings,
+    overrides: Vec<LineOverrides>,
     samples: Vec<Sample>,
 }
 
@@ -44,23 +45,38 @@ fn node() -> impl Strategy<Value = Node> {
         ),
         few([0, 0, 0, 1, -1, i32::MIN, i32::MAX]),
         ([unit(), unit(), unit()], [unit(), unit(), unit()], [unit(), unit(), unit()]),
+        facet(),
     )
         .prop_map(
-            |((object, shader, uv, normal, feature), depth, (line_width, line_opacity), priority, colors)| Node {
-                object,
-                shader,
-                uv,
-                normal,
-                feature,
-                depth,
-                line_color: colors.0,
-                line_width,
-                line_opacity,
-                priority,
-                throughput: colors.1,
-                contribution: colors.2,
+            |((object, shader, uv, normal, feature), depth, (line_width, line_opacity), priority, colors, facet)| {
+                Node {
+                    object,
+                    // Whoever reads it must not compare it.
+                    member: 7,
+                    position: facet.0,
+                    geometric_normal: facet.1,
+                    footprint: facet.2,
+                    shader,
+                    uv,
+                    normal,
+                    feature,
+                    depth,
+                    line_color: colors.0,
+                    line_width,
+                    line_opacity,
+                    priority,
+                    throughput: colors.1,
+                    contribution: colors.2,
+                }
             },
         )
+}
+
+/// Positions, normals and footprints of which many pairs overlap by a little more or less than thresholds.
+fn facet() -> impl Strategy<Value = ([f32; 3], [f32; 3], f32)> + Clone {
+    let coordinate = || prop_oneof![few([0.0, 1.0, 2.0, -1.0, 3.0]), -3.0..3.0f32];
+    let normals = [[0.0, 0.0, 1.0], [0.6, 0.0, 0.8], [0.0, -0.6, 0.8], [0.1, 0.2, 0.9], [1.0, 0.0, 0.0]];
+    ([coordinate(), coordinate(), coordinate()], few(normals), few([0.5, 1.0, 1.0, 0.25, 0.0]))
 }
 
 /// Random pixels as a renderer makes them: mostly one of a few nodes, so that some blocks are uniform.
@@ -96,7 +112,7 @@ fn settings() -> impl Strategy<Value = LineSettings> {
     (
         (any::<bool>(), any::<bool>(), threshold(&[0.0, 0.25, 0.4]), threshold(&[0.0, 1.0, 90.0, 179.9, 180.0])),
         (threshold(&[0.0, 0.25, 0.3]), few([0.0, 0.5, 1.0]), any::<bool>(), few([1.0, 3.0, 5.0, 20.0])),
-        (any::<bool>(), any::<bool>(), 0..8u8, few([1, 1, 2, 3, 4]), hidden()),
+        (any::<bool>(), any::<bool>(), 0..8u8, few([1, 1, 2, 3, 4]), hidden(), threshold(&[0.0, 0.5, 1.0, 2.0])),
     )
         .prop_map(|((object, shader, uv, normal), (feature, min_width, width_compensation, max_width), rest)| {
             LineSettings {
@@ -105,6 +121,7 @@ fn settings() -> impl Strategy<Value = LineSettings> {
                 uv,
                 normal,
                 feature,
+                overlap: rest.5,
                 min_width,
                 width_compensation,
                 max_width,
@@ -121,9 +138,34 @@ fn settings() -> impl Strategy<Value = LineSettings> {
         })
 }
 
+/// What materials change, for fewer or more materials than there are.
+fn overrides() -> impl Strategy<Value = Vec<LineOverrides>> {
+    fn some<T: Clone + std::fmt::Debug + 'static>(values: Vec<T>) -> impl Strategy<Value = Option<T>> {
+        prop_oneof![2 => Just(None), 1 => few(values).prop_map(Some)]
+    }
+    let on = || some(vec![false, true]);
+    let one = (
+        on(),
+        on(),
+        some(vec![None, Some(0.0), Some(0.3)]),
+        some(vec![None, Some(0.0), Some(30.0), Some(180.0)]),
+        some(vec![None, Some(0.0), Some(0.2)]),
+        some(vec![None, Some(0.25), Some(1.5)]),
+    );
+    let one = one.prop_map(|(object, shader, uv, normal, feature, overlap)| LineOverrides {
+        object,
+        shader,
+        uv,
+        normal,
+        feature,
+        overlap,
+    });
+    prop_oneof![1 => Just(Vec::new()), 2 => proptest::collection::vec(one, 0..4)]
+}
+
 fn case() -> impl Strategy<Value = Case> {
-    ((-20..20i32, -20..20i32, 1..14i32, 1..14i32), 1..9u32, [1..16i32, 1..16i32], settings()).prop_flat_map(
-        |((x0, y0, width, height), samples_per_pixel, tiles, settings)| {
+    ((-20..20i32, -20..20i32, 1..14i32, 1..14i32), 1..9u32, [1..16i32, 1..16i32], settings(), overrides())
+        .prop_flat_map(|((x0, y0, width, height), samples_per_pixel, tiles, settings, overrides)| {
             let rect = PixelRect { x0, y0, x1: x0 + width, y1: y0 + height };
             let count = rect.pixels() * samples_per_pixel as usize;
             // A palette of samples, and which pixels take which: runs of equal ones make uniform blocks.
@@ -139,24 +181,24 @@ fn case() -> impl Strategy<Value = Case> {
                         if jitter { Sample { offset, ..sample } } else { sample }
                     })
                     .collect();
-                Case { rect, samples_per_pixel, tiles, settings: settings.clone(), samples }
+                let (settings, overrides) = (settings.clone(), overrides.clone());
+                Case { rect, samples_per_pixel, tiles, settings, overrides, samples }
             })
-        },
-    )
+        })
 }
 
 /// In few words: proptest prints a case as often as it shrinks.
 impl std::fmt::Debug for Case {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Self { rect, samples_per_pixel, tiles, settings, samples } = self;
-        writeln!(f, "{rect:?}, {samples_per_pixel} samples, tiles of {tiles:?}\n{settings:?}")?;
+        let Self { rect, samples_per_pixel, tiles, settings, overrides, samples } = self;
+        writeln!(f, "{rect:?}, {samples_per_pixel} samples, tiles of {tiles:?}\n{settings:?}\n{overrides:?}")?;
         samples.iter().try_for_each(|sample| writeln!(f, "{sample:?}"))
     }
 }
 
 impl Case {
     fn rules(&self) -> Rules {
-        Rules::new(&self.settings, self.samples_per_pixel)
+        Rules::new(&self.settings, self.samples_per_pixel).with_materials(&self.overrides)
     }
 
     fn cut(&self, side: i32, rules: Rules) -> Tiles {

@@ -208,10 +208,7 @@ fn lists_are_kept_in_columns_of_their_own() {
     let two = buffer(&[&[ball(), card()], &[], &[ball()], &[ball(), card(), hit(3, 7.0, 1.0)]], 3);
     let [second, third] = &two.paths[0].behind[..] else { panic!("{:?}", two.paths[0].behind) };
     assert_eq!(two.surfaces_behind(), 3);
-    assert_eq!(
-        (second.rows.len(), second.row_of(0, 0), second.row_of(1, 1), second.row_of(3, 3)),
-        (2, Some(0), None, Some(1))
-    );
+    assert_eq!((second.rows.len(), second.row_of(0), second.row_of(1), second.row_of(3)), (2, Some(0), None, Some(1)));
     assert_eq!((&second.object, &third.object), (&Column::Constant(2), &Column::Constant(3)));
     assert_eq!(third.rows.sample(0), 3);
     // What stands behind a miss, or behind nothing, is no surface of a list.

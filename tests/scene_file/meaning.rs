@@ -62,6 +62,7 @@ fn every_setting_is_taken_over() {
             uv: Some(0.25),
             normal: Some(30.0),
             feature: Some(0.5),
+            overlap: Some(2.0),
             paths: RayKinds::CAMERA | RayKinds::REFRACTION,
             tint: false,
             compose: Composition::Throughput,

@@ -20,6 +20,7 @@ fn try_shade(body: &str, attributes: &[(&str, Attribute)]) -> Result<Vec3, Strin
         priority: None,
         visible_to: tusche::scene::settings::RayKinds::all(),
         lines: true,
+        group: None,
         span: None,
     });
     builder.attributes.extend_object(object, set);

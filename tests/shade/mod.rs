@@ -50,6 +50,7 @@ pub fn scene_with(scripts: &[&str], params: BTreeMap<String, (ParamValue, Option
             params: if index + 1 == scripts.len() { params.clone() } else { BTreeMap::new() },
             priority: None,
             double_sided: true,
+            lines: Default::default(),
             span: None,
         });
     }

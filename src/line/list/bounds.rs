@@ -6,7 +6,8 @@
 
 use crate::line::Rules;
 use crate::line::bounds::{Bounded, Bounds, PathBounds, Shape, of_rows, radii_squared, shape_of_rows};
-use crate::line::differ::Tests;
+use crate::line::materials::may_differ;
+use crate::line::overlap::{Facet, FacetBounds};
 use crate::sample::{Column, NodeColumns, SampleBuffer};
 
 /// Bounds of the surfaces at one place behind the first, for the blocks and pixels of a [`PathBounds`].
@@ -14,16 +15,23 @@ use crate::sample::{Column, NodeColumns, SampleBuffer};
 pub(in crate::line) struct LayerBounds {
     /// Square of the radius of each row's line, 0 if it draws none.
     pub radius_squared: Column<f32>,
-    whole: Part,
-    whole_shape: Shape,
-    blocks: Vec<Part>,
-    /// Nothing where no test reads shapes; so for pixels.
-    block_shapes: Vec<Shape>,
-    pixels: Vec<Part>,
-    pixel_shapes: Vec<Shape>,
+    /// One part.
+    whole: Parts,
+    blocks: Parts,
+    pixels: Parts,
 }
 
-/// Bounds of some surfaces at one place.
+/// Bounds of some sets of surfaces at one place.
+#[derive(Clone, Debug, Default)]
+struct Parts {
+    parts: Vec<Part>,
+    /// Nothing where no test reads shapes.
+    shapes: Vec<Shape>,
+    /// Nothing where no test reads facets.
+    facets: Vec<FacetBounds>,
+}
+
+/// Bounds of some surfaces at one place, but for their shape and facets.
 #[derive(Clone, Copy, Debug)]
 struct Part {
     bounds: Bounds,
@@ -33,54 +41,67 @@ struct Part {
 
 impl LayerBounds {
     pub(in crate::line) fn new(front: &PathBounds, buffer: &SampleBuffer, nodes: &NodeColumns, rules: &Rules) -> Self {
-        let shapes = rules.tests().reads_shapes;
-        let empty = Part { bounds: Bounds::EMPTY, every: true };
-        let mut layer = Self {
-            radius_squared: radii_squared(&nodes.line_width, rules),
-            whole: empty,
-            whole_shape: Shape::EMPTY,
-            blocks: Vec::new(),
-            block_shapes: Vec::new(),
-            pixels: Vec::new(),
-            pixel_shapes: Vec::new(),
-        };
+        let tests = rules.tests();
+        let radius_squared = radii_squared(&nodes.line_width, rules);
+        let (mut pixels, mut blocks, mut whole) = (Parts::default(), Parts::default(), Parts::default());
         for block in &front.blocks {
-            let (mut of_block, mut block_shape) = (empty, Shape::EMPTY);
+            let first = pixels.parts.len();
             for pixel in &front.pixels[block.first as usize..block.end as usize] {
                 let rows = nodes.rows.of_pixel(buffer.pixel_number(pixel.pixel));
                 let every = rows.len() == (pixel.end - pixel.first) as usize;
-                let mut bounds = Bounds::EMPTY;
-                if !rows.is_empty() {
-                    bounds = of_rows(&layer.radius_squared, nodes, rows.start, rows.end, rules);
-                    of_block.bounds = of_block.bounds.union(&bounds, nodes);
+                let bounds = if rows.is_empty() {
+                    Bounds::EMPTY
+                } else {
+                    of_rows(&radius_squared, nodes, rows.start, rows.end, rules)
+                };
+                pixels.parts.push(Part { bounds, every });
+                if tests.reads_shapes {
+                    pixels.shapes.push(shape_of_rows(nodes, rows.start, rows.end, tests));
                 }
-                of_block.every &= every;
-                layer.pixels.push(Part { bounds, every });
-                if shapes {
-                    let shape = shape_of_rows(nodes, rows.start, rows.end, rules.tests());
-                    block_shape = block_shape.union(&shape);
-                    layer.pixel_shapes.push(shape);
+                if tests.reads_facets() {
+                    pixels.facets.push(FacetBounds::of(rows.map(|row| Facet::of(nodes, row))));
                 }
             }
-            layer.whole.bounds = layer.whole.bounds.union(&of_block.bounds, nodes);
-            layer.whole.every &= of_block.every;
-            layer.blocks.push(of_block);
-            if shapes {
-                layer.whole_shape = layer.whole_shape.union(&block_shape);
-                layer.block_shapes.push(block_shape);
-            }
+            blocks.push_union(&pixels, first, nodes);
         }
-        layer
+        whole.push_union(&blocks, 0, nodes);
+        Self { radius_squared, whole, blocks, pixels }
     }
 
     /// Bytes of heap memory, and of the layer itself.
     pub(in crate::line) fn bytes(&self) -> usize {
-        size_of::<Self>()
-            + self.radius_squared.bytes()
-            + size_of_val(&self.blocks[..])
-            + size_of_val(&self.block_shapes[..])
-            + size_of_val(&self.pixels[..])
-            + size_of_val(&self.pixel_shapes[..])
+        let of_parts = |parts: &Parts| {
+            size_of_val(&parts.parts[..]) + size_of_val(&parts.shapes[..]) + size_of_val(&parts.facets[..])
+        };
+        let parts = [&self.whole, &self.blocks, &self.pixels].map(of_parts);
+        size_of::<Self>() + self.radius_squared.bytes() + parts.iter().sum::<usize>()
+    }
+}
+
+impl Parts {
+    /// Appends the bounds of all of some parts from the one at `first` on.
+    fn push_union(&mut self, of: &Self, first: usize, nodes: &NodeColumns) {
+        let empty = Part { bounds: Bounds::EMPTY, every: true };
+        self.parts.push(of.parts[first..].iter().fold(empty, |all, one| {
+            let present = one.bounds.object[0] <= one.bounds.object[1];
+            let bounds = if present { all.bounds.union(&one.bounds, nodes) } else { all.bounds };
+            Part { bounds, every: all.every && one.every }
+        }));
+        if !of.shapes.is_empty() {
+            self.shapes.push(of.shapes[first..].iter().fold(Shape::EMPTY, |all, one| all.union(one)));
+        }
+        if !of.facets.is_empty() {
+            self.facets.push(FacetBounds::of_all(&of.facets[first..]));
+        }
+    }
+
+    /// The bounds of a part and whether every list has a surface there; `None` if none has.
+    #[inline]
+    fn get(&self, index: usize) -> Option<(Bounded<'_>, bool)> {
+        let Part { bounds, every } = &self.parts[index];
+        let shape = self.shapes.get(index).unwrap_or(&Shape::EMPTY);
+        let facets = self.facets.get(index).unwrap_or(&FacetBounds::EMPTY);
+        (bounds.object[0] <= bounds.object[1]).then_some((Bounded { bounds, shape, facets }, *every))
     }
 }
 
@@ -123,7 +144,7 @@ impl<'b> Lists<'b> {
     #[inline]
     pub(super) fn first(&self) -> Bounded<'b> {
         match self.part {
-            PartOf::Tile => Bounded { bounds: &self.bounds.bounds, shape: &self.bounds.shape },
+            PartOf::Tile => self.bounds.bounded(),
             PartOf::Block(block) => self.bounds.blocks[block].bounded(),
             PartOf::Pixel(pixel) => self.bounds.of_pixel(pixel),
         }
@@ -134,20 +155,18 @@ impl<'b> Lists<'b> {
     pub(super) fn at(&self, place: usize) -> Option<(Bounded<'b>, bool)> {
         let Some(behind) = place.checked_sub(1) else { return Some((self.first(), true)) };
         let layer = &self.bounds.behind[behind];
-        let shape = |shapes: &'b [Shape], index: usize| shapes.get(index).unwrap_or(&Shape::EMPTY);
-        let (part, shape) = match self.part {
-            PartOf::Tile => (&layer.whole, &layer.whole_shape),
-            PartOf::Block(block) => (&layer.blocks[block], shape(&layer.block_shapes, block)),
-            PartOf::Pixel(pixel) => (&layer.pixels[pixel], shape(&layer.pixel_shapes, pixel)),
-        };
-        let present = part.bounds.object[0] <= part.bounds.object[1];
-        present.then_some((Bounded { bounds: &part.bounds, shape }, part.every))
+        match self.part {
+            PartOf::Tile => layer.whole.get(0),
+            PartOf::Block(block) => layer.blocks.get(block),
+            PartOf::Pixel(pixel) => layer.pixels.get(pixel),
+        }
     }
 
-    /// Whether every list surely has a surface that does not differ from any of these.
+    /// Whether every list, at least so far away on the film, surely has a surface that does not differ from any of these.
     #[inline]
-    pub(super) fn surely_meet(&self, surfaces: &Bounded<'_>, tests: &Tests) -> bool {
-        (0..self.places())
-            .any(|place| self.at(place).is_some_and(|(known, every)| every && !surfaces.may_differ(&known, tests)))
+    pub(super) fn surely_meet(&self, surfaces: &Bounded<'_>, gap_squared: f32, rules: &Rules) -> bool {
+        (0..self.places()).any(|place| {
+            self.at(place).is_some_and(|(known, every)| every && !may_differ(rules, surfaces, &known, gap_squared))
+        })
     }
 }

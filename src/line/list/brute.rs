@@ -3,7 +3,7 @@
 use super::{Kind, List, Search, Surface, push_list};
 use crate::line::LineCounts;
 use crate::line::differ::Features;
-use crate::line::pair::{Found, LineNode, MOST_LINES, Pair, Taken, distance_squared};
+use crate::line::pair::{Found, MOST_LINES, Pair, Taken, distance_squared};
 use crate::line::window::{PathTile, alpha, features};
 use crate::sample::PixelRect;
 
@@ -49,11 +49,10 @@ pub(super) fn other_side(neighbors: &PathTile<'_>, pair: &Pair) -> Features {
 /// The pair that the target of a row sees, but for lines that are taken.
 fn seen(search: &Search<'_, '_>, row: usize, taken: &Taken, counts: &mut LineCounts) -> Option<Pair> {
     let Search { window, targets, rules, kind } = *search;
-    let (tests, most) = (rules.tests(), rules.surfaces());
     let [x, y] = targets.buffer.pixel_of(targets.nodes.rows.sample(row));
     let node = targets.node([x, y], row);
     let mut surfaces = Vec::new();
-    let full = push_list(targets, row, most, &mut surfaces);
+    let full = push_list(targets, row, rules, &mut surfaces);
     let t = List { surfaces: &surfaces, full };
     let t1 = t.surfaces[0];
     let mut seen: Option<Pair> = None;
@@ -64,25 +63,24 @@ fn seen(search: &Search<'_, '_>, row: usize, taken: &Taken, counts: &mut LineCou
         for pixel in (segment.x0..segment.x1).map(|x| [x, segment.y]) {
             for row in tile.nodes.rows.of_pixel(tile.buffer.pixel_number(pixel)) {
                 let mut surfaces = Vec::new();
-                let full = push_list(tile, row, most, &mut surfaces);
+                let full = push_list(tile, row, rules, &mut surfaces);
                 let n = List { surfaces: &surfaces, full };
                 let n1 = n.surfaces[0];
                 counts.pairs_tested += 1;
-                let at =
-                    At { node: &node, pixel, offset: tile.offset(row), tile: segment.index as u32, row: row as u32 };
+                let d = distance_squared(&node, pixel, tile.offset(row));
+                let at = At { pixel, tile: segment.index as u32, row: row as u32, distance_squared: d };
 
                 // … the lines that t may see of it.
                 match kind {
                     Kind::Visible => {
                         for (place, s) in (0..).zip(n.surfaces) {
-                            let differs =
-                                if place == 0 { tests.differ(&s.features, &t1.features) } else { t.lacks(s, tests) };
+                            let differs = if place == 0 { s.differs(&t1, d, rules) } else { t.lacks(s, d, rules) };
                             if s.rank.outranks(t1.rank) && differs && !taken.contains(&s.features, false) {
                                 at.consider(s, s.radius_squared, place, false, &mut seen);
                             }
                         }
-                        let own = !n1.rank.outranks(t1.rank) && tests.differ(&t1.features, &n1.features);
-                        if (own || n.lacks(&t1, tests)) && !taken.contains(&n1.features, true) {
+                        let own = !n1.rank.outranks(t1.rank) && t1.differs(&n1, d, rules);
+                        if (own || n.lacks(&t1, d, rules)) && !taken.contains(&n1.features, true) {
                             at.consider(&t1, t1.radius_squared, 0, true, &mut seen);
                         }
                     }
@@ -92,12 +90,12 @@ fn seen(search: &Search<'_, '_>, row: usize, taken: &Taken, counts: &mut LineCou
                             t1.rank.outranks(s.rank) && s.radius_squared > 0.0 && hidden.draws(s.features.object)
                         };
                         for (place, s) in (0..).zip(n.surfaces) {
-                            if is_hidden(s) && t.lacks(s, tests) {
+                            if is_hidden(s) && t.lacks(s, d, rules) {
                                 at.consider(s, hidden.radius_squared, place, false, &mut seen);
                             }
                         }
                         for (place, s) in (0..).zip(t.surfaces) {
-                            if is_hidden(s) && n.lacks(s, tests) {
+                            if is_hidden(s) && n.lacks(s, d, rules) {
                                 at.consider(s, hidden.radius_squared, place, true, &mut seen);
                             }
                         }
@@ -109,20 +107,18 @@ fn seen(search: &Search<'_, '_>, row: usize, taken: &Taken, counts: &mut LineCou
     seen
 }
 
-/// A target and a neighbour.
-struct At<'t> {
-    node: &'t LineNode,
+/// A neighbour, as seen from a target.
+struct At {
     pixel: [i32; 2],
-    offset: [f32; 2],
     tile: u32,
     row: u32,
+    distance_squared: f32,
 }
 
-impl At<'_> {
+impl At {
     /// Keeps the line of a surface if it reaches the target and is seen rather than what was.
     fn consider(&self, surface: &Surface, radius_squared: f32, place: u32, own: bool, seen: &mut Option<Pair>) {
-        let Self { node, pixel, offset, tile, row } = *self;
-        let distance_squared = distance_squared(node, pixel, offset);
+        let Self { pixel, tile, row, distance_squared } = *self;
         if distance_squared >= radius_squared {
             return;
         }

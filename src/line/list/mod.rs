@@ -13,6 +13,8 @@
 //!
 //! Of all these the seen one minimises −priority, depth, distance, index of n, place in n's list, as in section 3.2.
 //!
+//! Whether two surfaces differ is decided by the tests of the material of the one that would draw.
+//!
 //! So lists add lines and take none away. The text can be read as if 3.2 held no more for K > 1; then two objects that
 //! cut each other would lose the line along the cut, since each goes on inside the other and is in both lists; and so would
 //! the edges of a box, whose far sides, turned towards the ray, have the normals of its near sides.
@@ -35,10 +37,12 @@ pub(super) mod bounds;
 pub(super) mod brute;
 pub(super) mod search;
 
-use super::Rules;
 use super::differ::{Features, Tests};
-use super::pair::Rank;
+use super::overlap::Facet;
+use super::pair::{Found, Rank};
 use super::window::{PathTile, PathWindow, features};
+use super::{Fired, Rules};
+use crate::sample::{Column, NodeColumns};
 
 /// Which lines are looked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -65,6 +69,36 @@ pub(super) struct Surface {
     pub rank: Rank,
     /// Square of the radius of its line, 0 if it draws none.
     pub radius_squared: f32,
+    /// Where the overlap test reads it.
+    pub facet: Facet,
+}
+
+impl Surface {
+    /// That of a row, whose lines have these squared radii.
+    #[inline]
+    fn of(nodes: &NodeColumns, row: usize, radii_squared: &Column<f32>, rules: &Rules) -> Self {
+        Self {
+            features: features(nodes, row),
+            rank: Rank::new(nodes.priority.get(row), nodes.depth.get(row)),
+            radius_squared: radii_squared.get(row),
+            facet: if rules.tests().reads_facets() { Facet::of(nodes, row) } else { Facet::NONE },
+        }
+    }
+
+    /// Whether its material finds that another surface differs, on rays that lie so far apart on the film.
+    #[inline]
+    fn differs(&self, other: &Self, distance_squared: f32, rules: &Rules) -> bool {
+        let (a, b) = (&self.features, &other.features);
+        let tests = rules.tests_of(a.shader);
+        tests.differ(a, b) || (tests.reads_facets() && self.overlaps(other, distance_squared, tests))
+    }
+
+    #[inline]
+    fn overlaps(&self, other: &Self, distance_squared: f32, tests: &Tests) -> bool {
+        self.features.object == other.features.object
+            && !self.features.is_miss()
+            && self.facet.overlaps(&other.facet, distance_squared, tests.overlap)
+    }
 }
 
 /// The surfaces of one sample's ray.
@@ -87,44 +121,54 @@ impl List<'_> {
         &self.surfaces[0]
     }
 
-    /// Whether the ray is known not to meet a surface.
+    /// Whether the ray is known not to meet a surface of a ray that lies so far from it on the film.
     #[inline]
-    pub fn lacks(&self, surface: &Surface, tests: &Tests) -> bool {
+    pub fn lacks(&self, surface: &Surface, distance_squared: f32, rules: &Rules) -> bool {
         self.is_complete_to(surface.rank)
-            && self.surfaces.iter().all(|known| tests.differ(&surface.features, &known.features))
+            && self.surfaces.iter().all(|known| surface.differs(known, distance_squared, rules))
     }
 }
 
-/// Whether the surface at a place of a neighbour's list draws a line at a target, if it reaches so far.
+/// Whether the surface at a place of a neighbour's list draws a line at a target so far away, if it reaches so far.
 #[inline]
-pub(super) fn draws_at(t: &List<'_>, s: &Surface, place: u32, tests: &Tests) -> bool {
-    let differs = || if place == 0 { tests.differ(&s.features, &t.first().features) } else { t.lacks(s, tests) };
-    s.rank.outranks(t.first().rank) && differs()
+pub(super) fn draws_at(t: &List<'_>, s: &Surface, place: u32, distance_squared: f32, rules: &Rules) -> bool {
+    s.rank.outranks(t.first().rank)
+        && match place {
+            0 => s.differs(t.first(), distance_squared, rules),
+            _ => t.lacks(s, distance_squared, rules),
+        }
 }
 
-/// Whether the first surface of a target draws its own line beside a neighbour, if it reaches so far.
+/// Whether the first surface of a target draws its own line beside a neighbour so far away, if it reaches so far.
 #[inline]
-pub(super) fn draws_own(t: &List<'_>, n: &List<'_>, tests: &Tests) -> bool {
+pub(super) fn draws_own(t: &List<'_>, n: &List<'_>, distance_squared: f32, rules: &Rules) -> bool {
     let (t1, n1) = (t.first(), n.first());
-    let differ = tests.differ(&t1.features, &n1.features);
-    differ && (!n1.rank.outranks(t1.rank) || n.lacks(t1, tests))
+    t1.differs(n1, distance_squared, rules) && (!n1.rank.outranks(t1.rank) || n.lacks(t1, distance_squared, rules))
 }
 
 /// Appends the list of a row; returns whether it is full.
-pub(super) fn push_list(tile: &PathTile<'_>, row: usize, most: usize, surfaces: &mut Vec<Surface>) -> bool {
+pub(super) fn push_list(tile: &PathTile<'_>, row: usize, rules: &Rules, surfaces: &mut Vec<Surface>) -> bool {
     let first = surfaces.len();
-    surfaces.push(Surface {
-        features: tile.features(row),
-        rank: tile.rank(row),
-        radius_squared: tile.bounds.radius_squared.get(row),
-    });
-    for (place, layer) in (1..most as u32).zip(&tile.bounds.behind) {
+    surfaces.push(Surface::of(tile.nodes, row, &tile.bounds.radius_squared, rules));
+    for (place, layer) in (1..).zip(&tile.bounds.behind) {
         let Some((nodes, row)) = tile.surface(row, place) else { break };
-        surfaces.push(Surface {
-            features: features(nodes, row),
-            rank: Rank::new(nodes.priority.get(row), nodes.depth.get(row)),
-            radius_squared: layer.radius_squared.get(row),
-        });
+        surfaces.push(Surface::of(nodes, row, &layer.radius_squared, rules));
     }
-    surfaces.len() - first == most
+    surfaces.len() - first == rules.surfaces()
+}
+
+/// Which tests find a difference between the two sides of a line: the surface that draws it, and the first of the other
+/// sample.
+pub(super) fn fired(rules: &Rules, targets: &PathTile<'_>, found: &Found, neighbors: &PathTile<'_>) -> Option<Fired> {
+    let (pair, mut lists) = (&found.pair, Vec::new());
+    push_list(targets, found.row, rules, &mut lists);
+    let mine = *lists.get(if pair.own { pair.surface as usize } else { 0 })?;
+    lists.clear();
+    push_list(neighbors, pair.row as usize, rules, &mut lists);
+    let theirs = *lists.get(if pair.own { 0 } else { pair.surface as usize })?;
+    let tests = rules.tests_of(if pair.own { &mine } else { &theirs }.features.shader);
+    let mut fired = tests.fired(&mine.features, &theirs.features);
+    let overlaps = tests.reads_facets() && mine.overlaps(&theirs, pair.distance_squared, tests);
+    fired.set(Fired::OVERLAP, overlaps);
+    Some(fired)
 }

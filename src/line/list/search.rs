@@ -16,10 +16,11 @@ use super::bounds::Lists;
 use super::brute::other_side;
 use super::{Kind, List, Search, Surface, draws_at, draws_own, push_list};
 use crate::line::LineCounts;
-use crate::line::bounds::Stylist;
+use crate::line::bounds::{Bounded, Stylist};
+use crate::line::materials::may_differ;
 use crate::line::pair::{Found, LineNode, MOST_LINES, Pair, Rank, Taken, distance_squared};
 use crate::line::search::{pixel_gap_squared, pixel_rect, rect_gap_squared};
-use crate::line::window::{LineStyle, PathTile, alpha, features, style};
+use crate::line::window::{LineStyle, PathTile, alpha, style};
 
 /// The line that each target sees which is not `skipped`, in no particular order.
 pub(in crate::line) fn find(search: &Search<'_, '_>, skipped: &[bool], counts: &mut LineCounts) -> Vec<Found> {
@@ -160,18 +161,18 @@ impl<'w, 'a> Scratch<'w, 'a> {
     /// What targets with these lists may see of neighbours with those, if anything.
     fn sight(&self, t: &Lists<'_>, n: &Lists<'_>, tile: &PathTile<'_>, gap_squared: f32) -> Option<Sight> {
         let rules = self.search.rules;
-        let tests = rules.tests();
         let t1 = t.first();
+        let met = |lists: &Lists<'_>, s: &Bounded<'_>| lists.surely_meet(s, gap_squared, rules);
         let mut sight = Sight { best: Rank::LAST, others: false, own: false, radius_squared: 0.0, style: Styles::None };
         match self.search.kind {
             Kind::Visible => {
                 let n1 = n.first();
-                let firsts_may_differ = t1.may_differ(&n1, tests);
+                let firsts_may_differ = may_differ(rules, &t1, &n1, gap_squared);
                 for place in 0..n.places() {
                     let Some((s, _)) = n.at(place) else { continue };
                     if gap_squared < s.bounds.radius_squared
                         && s.bounds.best.outranks(t1.bounds.lowest)
-                        && (if place == 0 { firsts_may_differ } else { !t.surely_meet(&s, tests) })
+                        && (if place == 0 { firsts_may_differ } else { !met(t, &s) })
                     {
                         sight.others = true;
                         sight.best = sight.best.better(s.bounds.best);
@@ -183,7 +184,7 @@ impl<'w, 'a> Scratch<'w, 'a> {
                 }
                 sight.own = firsts_may_differ
                     && gap_squared < t1.bounds.radius_squared
-                    && (!n1.bounds.lowest.outranks(t1.bounds.highest) || !n.surely_meet(&t1, tests));
+                    && (!n1.bounds.lowest.outranks(t1.bounds.highest) || !met(n, &t1));
             }
             Kind::Hidden => {
                 let radius_squared = rules.hidden().map_or(0.0, |hidden| hidden.radius_squared);
@@ -193,20 +194,14 @@ impl<'w, 'a> Scratch<'w, 'a> {
                 sight.radius_squared = radius_squared;
                 for place in 0..n.places() {
                     let Some((s, _)) = n.at(place) else { continue };
-                    if s.bounds.radius_squared > 0.0
-                        && t1.bounds.highest.outranks(s.bounds.lowest)
-                        && !t.surely_meet(&s, tests)
-                    {
+                    if s.bounds.radius_squared > 0.0 && t1.bounds.highest.outranks(s.bounds.lowest) && !met(t, &s) {
                         sight.others = true;
                         sight.best = sight.best.better(s.bounds.best);
                     }
                 }
                 for place in 1..t.places() {
                     let Some((s, _)) = t.at(place) else { continue };
-                    if s.bounds.radius_squared > 0.0
-                        && t1.bounds.highest.outranks(s.bounds.lowest)
-                        && !n.surely_meet(&s, tests)
-                    {
+                    if s.bounds.radius_squared > 0.0 && t1.bounds.highest.outranks(s.bounds.lowest) && !met(n, &s) {
                         sight.others = true;
                         sight.best = sight.best.better(s.bounds.best);
                     }
@@ -489,33 +484,13 @@ impl<'w, 'a> Scratch<'w, 'a> {
 
     /// Gathers the lists of a pixel.
     fn gather(&mut self, tile: &PathTile<'_>, place: usize) {
-        let most = self.search.rules.surfaces();
+        let rules = self.search.rules;
         let pixel = &tile.bounds.pixels[place];
-        let number = tile.buffer.pixel_number(pixel.pixel);
         for row in pixel.first as usize..pixel.end as usize {
-            let first = self.surfaces.len();
-            self.surfaces.push(Surface {
-                features: tile.features(row),
-                rank: tile.rank(row),
-                radius_squared: tile.bounds.radius_squared.get(row),
-            });
-            let sample = tile.nodes.rows.sample(row);
-            for (nodes, bounds) in tile.nodes.behind.iter().zip(&tile.bounds.behind) {
-                let Some(row) = nodes.row_of(number, sample) else { break };
-                self.surfaces.push(Surface {
-                    features: features(nodes, row),
-                    rank: Rank::new(nodes.priority.get(row), nodes.depth.get(row)),
-                    radius_squared: bounds.radius_squared.get(row),
-                });
-            }
-            let end = self.surfaces.len();
-            self.neighbors.push(Neighbor {
-                offset: tile.offset(row),
-                row: row as u32,
-                first: first as u32,
-                end: end as u32,
-                full: end - first == most,
-            });
+            let first = self.surfaces.len() as u32;
+            let full = push_list(tile, row, rules, &mut self.surfaces);
+            let end = self.surfaces.len() as u32;
+            self.neighbors.push(Neighbor { offset: tile.offset(row), row: row as u32, first, end, full });
         }
     }
 
@@ -527,14 +502,14 @@ impl<'w, 'a> Scratch<'w, 'a> {
     #[inline]
     fn see_others(&self, target: &mut Target, n: &Neighbor, pixel: [i32; 2], tile: u32, taken: Option<&Taken>) {
         let distance_squared = distance_squared(&target.node, pixel, n.offset);
-        let tests = self.search.rules.tests();
+        let rules = self.search.rules;
         for (place, s) in (0..).zip(self.list(n).surfaces) {
             if distance_squared >= s.radius_squared {
                 continue;
             }
             let pair = Pair { rank: s.rank, distance_squared, pixel, tile, row: n.row, surface: place, own: false };
             if target.best.is_none_or(|best| pair.beats(&best))
-                && draws_at(&self.list(&target.list), s, place, tests)
+                && draws_at(&self.list(&target.list), s, place, distance_squared, rules)
                 && !taken.is_some_and(|taken| taken.contains(&s.features, false))
             {
                 target.best = Some(pair);
@@ -552,7 +527,7 @@ impl<'w, 'a> Scratch<'w, 'a> {
         let (list, rank) = (self.list(n), target.node.rank);
         let pair = Pair { rank, distance_squared, pixel, tile, row: n.row, surface: 0, own: true };
         if target.best.is_none_or(|best| pair.beats(&best))
-            && draws_own(&self.list(&target.list), &list, self.search.rules.tests())
+            && draws_own(&self.list(&target.list), &list, distance_squared, self.search.rules)
             && !taken.is_some_and(|taken| taken.contains(&list.first().features, true))
         {
             target.best = Some(pair);
@@ -566,7 +541,7 @@ impl<'w, 'a> Scratch<'w, 'a> {
         if distance_squared >= hidden.radius_squared {
             return;
         }
-        let (t, n_list, tests) = (self.list(&target.list), self.list(n), self.search.rules.tests());
+        let (t, n_list, rules) = (self.list(&target.list), self.list(n), self.search.rules);
         let front = target.node.rank;
         for (list, other, own) in [(n_list, t, false), (t, n_list, true)] {
             for (place, s) in (0..).zip(list.surfaces) {
@@ -574,7 +549,7 @@ impl<'w, 'a> Scratch<'w, 'a> {
                     continue;
                 }
                 let pair = Pair { rank: s.rank, distance_squared, pixel, tile, row: n.row, surface: place, own };
-                if target.best.is_none_or(|best| pair.beats(&best)) && other.lacks(s, tests) {
+                if target.best.is_none_or(|best| pair.beats(&best)) && other.lacks(s, distance_squared, rules) {
                     target.best = Some(pair);
                 }
             }
@@ -586,7 +561,7 @@ impl<'w, 'a> Scratch<'w, 'a> {
         let Search { window, rules, .. } = self.search;
         let Some(tile) = &window.tiles[pair.tile as usize] else { return };
         let first = self.surfaces.len();
-        let full = push_list(tile, pair.row as usize, rules.surfaces(), &mut self.surfaces);
+        let full = push_list(tile, pair.row as usize, rules, &mut self.surfaces);
         let neighbor = Neighbor {
             offset: tile.offset(pair.row as usize),
             row: pair.row,

@@ -244,6 +244,9 @@ pub(super) struct Lines {
     pub normal: Threshold,
     /// Lines where any channel of the scripts' feature colours differs by more than this.
     pub feature: Threshold,
+    /// Lines where an object (or a group) folds over itself: the nearer sample lies above the tangent plane of the other
+    /// by more than this times the width of a pixel there and the samples' distance in pixels. 2 is a good start.
+    pub overlap: Threshold,
     /// Which rays see lines.
     pub paths: Vec<LinePath>,
     /// Whether lines in reflections and refractions take the colour of what reflects and refracts them.
@@ -272,6 +275,7 @@ impl Default for Lines {
             uv: Threshold::Off(false),
             normal: Threshold::Off(false),
             feature: Threshold::Off(false),
+            overlap: Threshold::Off(false),
             paths: vec![LinePath::Camera, LinePath::Reflection, LinePath::Refraction],
             tint: true,
             compose: Compose::Replace,
@@ -290,7 +294,8 @@ pub(super) struct HiddenLines {
     /// Full width in pixels of hidden lines; 0 is no line.
     #[schemars(range(min = 0, max = MAX_LINE_WIDTH))]
     pub width: f64,
-    /// Names of the objects whose hidden lines are drawn; the name of a model stands for all its parts. Default: all.
+    /// Names of the objects whose hidden lines are drawn; the name of a model stands for all its parts, an
+    /// object in a group for the group. Default: all.
     pub objects: Option<Vec<String>>,
 }
 
@@ -347,6 +352,28 @@ pub(super) struct Material {
     /// Whether surfaces are seen from behind.
     #[serde(default = "yes")]
     pub double_sided: bool,
+    /// Line tests of its own, instead of those of `[lines]`.
+    #[serde(default)]
+    pub lines: MaterialLines,
+}
+
+/// Line tests of a material. Two samples are tested as the material says whose line would be drawn: that of the larger
+/// priority, else of the nearer surface. What is left out is as in `[lines]`.
+#[derive(Debug, Default, Deserialize, Serialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub(super) struct MaterialLines {
+    /// Lines where two objects meet in the picture.
+    pub object: Option<bool>,
+    /// Lines where two materials meet in the picture.
+    pub shader: Option<bool>,
+    /// Lines where texture coordinates differ by more than this distance.
+    pub uv: Option<Threshold>,
+    /// Lines where shading normals differ by more than this angle in degrees, at most 180.
+    pub normal: Option<Threshold>,
+    /// Lines where any channel of the scripts' feature colours differs by more than this.
+    pub feature: Option<Threshold>,
+    /// Lines where an object (or a group) folds over itself by more than this.
+    pub overlap: Option<Threshold>,
 }
 
 /// A parameter's value.
@@ -497,9 +524,12 @@ pub(super) struct Object {
     /// Which rays meet it.
     #[serde(default = "all_rays")]
     pub visible_to: Vec<RayKind>,
-    /// Whether its surfaces draw lines.
+    /// Whether its surfaces draw lines. If not, what lies before it still draws its own line at their border.
     #[serde(default = "yes")]
     pub lines: bool,
+    /// Objects of one group count as one object: no line where they meet. For a model, all its parts.
+    #[schemars(length(min = 1))]
+    pub group: Option<String>,
     /// Whether the lights of a model are used. Default: true if this file has no `[[lights]]`.
     pub lights: Option<bool>,
     /// Values that shaders ask for with `hit.attribute("name", default)`.

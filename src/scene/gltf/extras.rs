@@ -1,7 +1,7 @@
 //! What an exporter may add for Tusche: `extras.tusche` on materials and nodes.
 //!
 //! On a material: `{ "shader": "ink.rhai", "params": { "ink_width": 2.5 }, "priority": 3 }`. On a node, also
-//! `"lines": false`; a node's shader replaces all materials of its mesh. What a node says does not reach its children.
+//! `"lines": false` and `"group": "car"`; a node's shader replaces all materials of its mesh. What a node says does not reach its children.
 //!
 //! A shader is a path relative to the model, or `builtin:NAME`. Parameters are written as in a scene file: booleans,
 //! numbers, arrays of two to four numbers, texts, and textures as
@@ -58,6 +58,7 @@ pub(super) struct Extra {
     pub look: Look,
     pub priority: Option<i32>,
     pub lines: Option<bool>,
+    pub group: Option<String>,
 }
 
 /// Where extras are found.
@@ -71,7 +72,7 @@ impl On {
     fn keys(self) -> &'static [&'static str] {
         match self {
             Self::Material => &["shader", "params", "priority"],
-            Self::Node => &["shader", "params", "priority", "lines"],
+            Self::Node => &["shader", "params", "priority", "lines", "group"],
         }
     }
 }
@@ -116,6 +117,8 @@ pub(super) fn read(
                 Some(lines) => extra.lines = Some(lines),
                 None => report.error(place, "expected true or false"),
             },
+            ("group", Value::String(group)) if on == On::Node && !group.is_empty() => extra.group = Some(group.clone()),
+            ("group", _) if on == On::Node => report.error(place, "expected the name of a group"),
             _ => report.error(place, unknown(key, on.keys())),
         }
     }

@@ -88,6 +88,8 @@ pub struct Placement {
     pub visible_to: RayKinds,
     /// Whether its surfaces draw lines; the model's extras can still switch them off for a node.
     pub lines: bool,
+    /// The group of all objects; `None` leaves what the model's extras say.
+    pub group: Option<String>,
     /// Where the model was placed.
     pub span: Option<Span>,
 }
@@ -103,6 +105,7 @@ impl Placement {
             priority: None,
             visible_to: RayKinds::all(),
             lines: true,
+            group: None,
             span: None,
         }
     }

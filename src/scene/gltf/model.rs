@@ -25,6 +25,7 @@ use crate::scene::ids::{MaterialId, MeshId, TextureId};
 use crate::scene::light::Light;
 use crate::scene::material::{Material, ParamValue};
 use crate::scene::mesh::Mesh;
+use crate::scene::settings::LineOverrides;
 use crate::scene::texture::Texture;
 use crate::scene::{Object, SceneBuilder};
 
@@ -50,6 +51,7 @@ struct Part {
     world_from_object: DAffine3,
     priority: Option<i32>,
     lines: bool,
+    group: Option<String>,
     attributes: AttributeSet,
 }
 
@@ -196,7 +198,8 @@ impl Walk<'_> {
         let is_skinned = deformation.joints.is_some();
         let model_from_mesh = if is_skinned { DAffine3::IDENTITY } else { self.model_from_nodes[node] };
         let shape = self.shape(node, mesh, deformation);
-        let Extra { look, priority, lines } = extra;
+        let Extra { look, priority, lines, group } = extra;
+        let group = self.placement.group.clone().or(group);
         let look = look.shader.is_some().then(|| {
             self.looks.push((name.to_owned(), look));
             self.looks.len() - 1
@@ -222,6 +225,7 @@ impl Walk<'_> {
                 world_from_object,
                 priority: self.placement.priority.or(priority),
                 lines: self.placement.lines && lines.unwrap_or(true),
+                group: group.clone(),
                 attributes: attributes.clone(),
             });
         }
@@ -394,8 +398,10 @@ impl Model {
                         reference.texture = textures[reference.texture.index()];
                     }
                 }
+                let lines = LineOverrides::default();
                 let script = into.add_script(script);
-                let id = into.add_material(Material { name, script, params, priority, double_sided, span: None });
+                let id =
+                    into.add_material(Material { name, script, params, priority, double_sided, lines, span: None });
                 if !attributes.is_empty() {
                     into.attributes.materials.insert(id, attributes);
                 }
@@ -424,6 +430,7 @@ impl Model {
                 priority: part.priority,
                 visible_to: placement.visible_to,
                 lines: part.lines,
+                group: part.group,
                 span: placement.span.clone(),
             });
             into.attributes.extend_object(id, part.attributes);

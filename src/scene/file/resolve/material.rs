@@ -11,6 +11,7 @@ use crate::diag::{Diagnostic, Span};
 use crate::math::{Affine2, Vec2, Vec3, Vec4};
 use crate::scene::ids::{MaterialId, ScriptId};
 use crate::scene::material::{Material, ParamValue, Script};
+use crate::scene::settings::LineOverrides;
 use crate::scene::texture::{self, Image, Texture, TextureFilter, TextureRef, Wrap};
 use crate::shade::builtin;
 
@@ -25,12 +26,15 @@ impl Resolver<'_> {
             let Some(material) = materials.get(&entry.key) else { continue };
             let Some(script) = self.script(&material.shader, &entry.node.span_of("shader")) else { continue };
             let params = self.params(&material.params, entry.node.get("params"));
+            let lines_node = entry.node.get("lines").unwrap_or(&entry.node);
+            let lines = self.line_overrides(&material.lines, &format!("materials.{}.lines", entry.key), lines_node);
             let id = self.scene.add_material(Material {
                 name: entry.key.clone(),
                 script,
                 params,
                 priority: material.priority,
                 double_sided: material.double_sided,
+                lines,
                 span: Some(entry.key_span.clone()),
             });
             self.materials.push((entry.key.clone(), id));
@@ -64,6 +68,7 @@ impl Resolver<'_> {
                 params: BTreeMap::new(),
                 priority: None,
                 double_sided: true,
+                lines: LineOverrides::default(),
                 span: None,
             })
         })

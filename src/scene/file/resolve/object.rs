@@ -26,6 +26,11 @@ impl Resolver<'_> {
         let nodes = self.node.get("objects").map_or(&[][..], Node::items);
         for (object, node) in objects.iter().zip(nodes) {
             let name = self.object_name(object, node, &mut names);
+            if object.group.as_deref() == Some("") {
+                let fault = Diagnostic::error(format!("the group of object `{name}` has no name"));
+                let hint = "objects with equal group names count as one; leave `group` out for an object of its own";
+                self.faults.push(fault.at(node.span_of("group")).hint(hint));
+            }
             match (&object.gltf, object.shape) {
                 (Some(model), None) if !node.mentions("shape") => {
                     let found = self.model(model, object, node, name);
@@ -91,6 +96,7 @@ impl Resolver<'_> {
             priority: object.priority,
             visible_to: visible_to(object),
             lines: object.lines,
+            group: object.group.clone(),
             span: Some(node.span.clone()),
         };
         match gltf::import(&path, self.context.files, time, &mut self.scene, &placement) {
@@ -134,6 +140,7 @@ impl Resolver<'_> {
             priority: object.priority,
             visible_to: visible_to(object),
             lines: object.lines,
+            group: object.group.clone(),
             span: Some(node.span.clone()),
         });
         self.scene.attributes.extend_object(id, attributes(object));

@@ -10,7 +10,7 @@ use crate::math::Vec3;
 use crate::scene::check::MAX_PIXELS;
 use crate::scene::ids::ObjectId;
 use crate::scene::settings::{
-    Background, Composition, FilterKind, HiddenLines, LineSettings, RayKinds, RenderSettings,
+    Background, Composition, FilterKind, HiddenLines, LineOverrides, LineSettings, RayKinds, RenderSettings,
 };
 use crate::scene::texture::{Texture, TextureFilter, Wrap};
 
@@ -77,14 +77,7 @@ impl Resolver<'_> {
 
     pub(super) fn lines(&mut self, lines: &format::Lines) {
         let node = self.part("lines");
-        if let format::Threshold::Above(degrees) = lines.normal
-            && degrees > 180.0
-        {
-            self.fault(
-                format!("`lines.normal` is an angle of at most 180 degrees, found {degrees}"),
-                node.span_of("normal"),
-            );
-        }
+        self.check_angle(lines.normal, "lines.normal", node);
         if lines.min_width > lines.max_width {
             let message = format!("`min_width` is {} and `max_width` only {}", lines.min_width, lines.max_width);
             self.fault(message, node.span_of("min_width"));
@@ -110,10 +103,6 @@ impl Resolver<'_> {
             format::LinePath::Reflection => RayKinds::REFLECTION,
             format::LinePath::Refraction => RayKinds::REFRACTION,
         });
-        let threshold = |threshold| match threshold {
-            format::Threshold::Off(_) => None,
-            format::Threshold::Above(value) => Some(value as f32),
-        };
         self.scene.lines = LineSettings {
             enabled: true,
             color: rgb(lines.color),
@@ -126,6 +115,7 @@ impl Resolver<'_> {
             uv: threshold(lines.uv),
             normal: threshold(lines.normal),
             feature: threshold(lines.feature),
+            overlap: threshold(lines.overlap),
             paths: paths.fold(RayKinds::empty(), RayKinds::union),
             tint: lines.tint,
             compose: match lines.compose {
@@ -166,5 +156,36 @@ impl Resolver<'_> {
         if let Some(hidden) = &mut self.scene.lines.hidden {
             hidden.objects = Some(objects.into_iter().collect());
         }
+    }
+
+    /// What a material changes about the line tests; `path` names it in messages.
+    pub(super) fn line_overrides(&mut self, lines: &format::MaterialLines, path: &str, node: &Node) -> LineOverrides {
+        if let Some(normal) = lines.normal {
+            self.check_angle(normal, &format!("{path}.normal"), node);
+        }
+        LineOverrides {
+            object: lines.object,
+            shader: lines.shader,
+            uv: lines.uv.map(threshold),
+            normal: lines.normal.map(threshold),
+            feature: lines.feature.map(threshold),
+            overlap: lines.overlap.map(threshold),
+        }
+    }
+
+    fn check_angle(&mut self, normal: format::Threshold, path: &str, node: &Node) {
+        if let format::Threshold::Above(degrees) = normal
+            && degrees > 180.0
+        {
+            let message = format!("`{path}` is an angle of at most 180 degrees, found {degrees}");
+            self.fault(message, node.span_of("normal"));
+        }
+    }
+}
+
+fn threshold(threshold: format::Threshold) -> Option<f32> {
+    match threshold {
+        format::Threshold::Off(_) => None,
+        format::Threshold::Above(value) => Some(value as f32),
     }
 }
