@@ -33,8 +33,21 @@ pub struct MaterialPlan {
     pub refracts: bool,
     /// Whether rays may go straight on here because the surface is not fully opaque.
     pub see_through: bool,
+    /// What is asked of its hits behind the first of a ray, for lines alone.
+    pub behind: BehindPlan,
     /// Whether any object uses it.
     used: bool,
+}
+
+/// What rendering asks of the shader where a hit lies behind the first of its ray (DESIGN section 3.4).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BehindPlan {
+    /// Outputs that are evaluated, with the one that marks hits whose script failed.
+    pub wanted: OutputSet,
+    /// Inputs that are gathered.
+    pub inputs: InputSet,
+    /// Whether light samples are taken, for the script.
+    pub lights: bool,
 }
 
 impl MaterialPlan {
@@ -56,6 +69,8 @@ pub struct LinePlan {
     pub reach: i32,
     /// Whether scripts style lines one by one.
     pub scripted: bool,
+    /// The settings with the tests that are on for any material that draws lines.
+    pub tests: LineSettings,
 }
 
 /// What this scene calls for.
@@ -73,6 +88,8 @@ pub struct Plan {
     pub shadow_rays: bool,
     /// The line pass; `None` if no line can be seen.
     pub lines: Option<LinePlan>,
+    /// How many surfaces a ray's list holds at most; 1 without lines.
+    pub surfaces: u32,
     /// What samples keep.
     pub layout: SampleLayout,
     /// The layers that are developed.
@@ -101,6 +118,7 @@ impl Plan {
         let refraction_depth = if passes { settings.refraction_depth } else { 0 };
 
         let lines = plan_lines(scene, shaders, layers);
+        let surfaces = if lines.is_some() { tests.surfaces } else { 1 };
         let in_play = tests_in_play(scene, &drawing_materials(scene));
         let pairs = lines.as_ref().map_or(PairSet::empty(), |_| read_on_pairs(scene, shaders));
         let wants_feature =
@@ -108,8 +126,7 @@ impl Plan {
         for (material, shader) in materials.iter_mut().zip(shaders.iter()) {
             let may = shader.analysis().writable();
             if lines.is_some() {
-                material.wanted |= may
-                    & (OutputSet::LINE_COLOR | OutputSet::LINE_WIDTH | OutputSet::LINE_OPACITY | OutputSet::PRIORITY);
+                material.wanted |= may & LINE_OUTPUTS;
             }
             if wants_feature && (lines.is_some() || layers.contains(&Layer::Feature)) {
                 material.wanted |= may & OutputSet::FEATURE;
@@ -117,6 +134,16 @@ impl Plan {
             // Only now is it known what is asked of the shader, and so what it reads.
             material.inputs = shader.needs(material.wanted | marker(color, lines.is_some()));
             material.lights = has_lights && (material.lit || material.inputs.intersects(InputSet::LIGHTS));
+            if surfaces > 1 {
+                let behind = &mut material.behind;
+                behind.wanted = material.wanted & (LINE_OUTPUTS | OutputSet::OPACITY);
+                if in_play.feature.is_some() {
+                    behind.wanted |= material.wanted & OutputSet::FEATURE;
+                }
+                behind.wanted |= marker(false, true);
+                behind.inputs = shader.needs(behind.wanted);
+                behind.lights = has_lights && behind.inputs.intersects(InputSet::LIGHTS);
+            }
         }
 
         let secondary = reflection_depth + refraction_depth > 0;
@@ -147,7 +174,8 @@ impl Plan {
             declared_widths: shaders.iter().map(|shader| shader.params().max_line_width()).collect(),
             materials: materials.len(),
         };
-        let shadow_rays = materials.iter().any(|m| m.used && m.lights) && scene.lights().iter().any(|l| l.shadows);
+        let shadow_rays = materials.iter().any(|m| m.used && (m.lights || m.behind.lights))
+            && scene.lights().iter().any(|l| l.shadows);
         let mut plan = Self {
             materials,
             color,
@@ -155,6 +183,7 @@ impl Plan {
             refraction_depth,
             shadow_rays,
             lines,
+            surfaces,
             layout,
             layers: layers.to_vec(),
             filter: Filter::new(settings.filter, settings.filter_radius),
@@ -170,6 +199,10 @@ impl Plan {
         self.reflection_depth + self.refraction_depth > 0
     }
 }
+
+/// How a surface's lines look.
+const LINE_OUTPUTS: OutputSet =
+    OutputSet::LINE_COLOR.union(OutputSet::LINE_WIDTH).union(OutputSet::LINE_OPACITY).union(OutputSet::PRIORITY);
 
 /// Outputs that mark a hit whose script failed, which no analysis of the script foresees.
 #[must_use]
@@ -227,6 +260,7 @@ fn plan_material(shader: &Shader, lights: bool, color: bool, used: bool) -> Mate
     MaterialPlan {
         wanted: wanted & analysis.writable(),
         inputs: InputSet::empty(),
+        behind: BehindPlan { wanted: OutputSet::empty(), inputs: InputSet::empty(), lights: false },
         mode: shader.mode(),
         lit,
         lights: false,
@@ -239,11 +273,14 @@ fn plan_material(shader: &Shader, lights: bool, color: bool, used: bool) -> Mate
 
 fn plan_lines(scene: &Scene, shaders: &Shaders, layers: &[Layer]) -> Option<LinePlan> {
     let settings = scene.lines();
-    let shown = layers
-        .iter()
-        .any(|l| matches!(l, Layer::Rgba | Layer::Below | Layer::Line | Layer::LineType(_) | Layer::LinePath(_)));
+    let shown = layers.iter().any(|l| match l {
+        Layer::Rgba | Layer::Below | Layer::Line | Layer::LineType(_) | Layer::LinePath(_) => true,
+        Layer::HiddenLine => settings.hidden.is_some(),
+        _ => false,
+    });
     let draws = drawing_materials(scene);
-    let tested = tests_in_play(scene, &draws).tests_anything();
+    let tests = tests_in_play(scene, &draws);
+    let tested = tests.tests_anything();
     if !settings.enabled || !shown || !tested || settings.paths.is_empty() {
         return None;
     }
@@ -266,7 +303,13 @@ fn plan_lines(scene: &Scene, shaders: &Shaders, layers: &[Layer]) -> Option<Line
     let overrides = scene.materials().iter().zip(&draws);
     let overrides: Vec<_> =
         overrides.map(|(material, draws)| draws.then_some(material.lines).unwrap_or_default()).collect();
-    let rules = Rules::new(settings, scene.render().samples).with_widest(widest).with_materials(&overrides);
+    // Nodes tell of an object in a group only the group.
+    let mut settings = settings.clone();
+    let stand_ins = scene.stand_ins();
+    for id in settings.hidden.iter_mut().flat_map(|hidden| hidden.objects.iter_mut().flatten()) {
+        *id = stand_ins.get(id.index()).copied().unwrap_or(*id);
+    }
+    let rules = Rules::new(&settings, scene.render().samples).with_widest(widest).with_materials(&overrides);
     let scripted: Vec<bool> =
         shaders.iter().zip(&draws).map(|(shader, draws)| *draws && shader.styles_lines()).collect();
     let rules = rules.with_scripts(&scripted);
@@ -274,7 +317,7 @@ fn plan_lines(scene: &Scene, shaders: &Shaders, layers: &[Layer]) -> Option<Line
     let by_type = layers.iter().any(|layer| matches!(layer, Layer::LineType(_)));
     let rules = if by_type { rules } else { rules.with_any_pair() };
     let reach = rules.reach();
-    Some(LinePlan { rules, widest, reach, scripted: scripted.contains(&true) })
+    Some(LinePlan { rules, widest, reach, scripted: scripted.contains(&true), tests })
 }
 
 /// What scripts that style lines read on their pairs.
@@ -401,7 +444,7 @@ fn explain(plan: &Plan, scene: &Scene, shaders: &Shaders) -> String {
         row("groups", explain_groups(scene));
     }
     row("strata", "1: no lens, no shutter, no rough mirror".into());
-    row("surfaces", "1".into());
+    row("surfaces", explain_surfaces(plan, scene.lines()));
     row("columns", columns(plan).join(" "));
     row("layers", plan.layers.iter().map(ToString::to_string).collect::<Vec<_>>().join(" "));
     for (index, material) in plan.materials.iter().enumerate().filter(|(_, m)| m.used) {
@@ -487,6 +530,31 @@ fn explain_lines(plan: &Plan, scene: &Scene) -> String {
         (lines.widest * 1e3).round() / 1e3,
         lines.reach
     )
+}
+
+fn explain_surfaces(plan: &Plan, settings: &LineSettings) -> String {
+    let Some(lines) = plan.lines.as_ref().filter(|_| plan.surfaces > 1) else {
+        let why = if settings.surfaces > 1 { "no line can be seen" } else { "`lines.surfaces` asks for no more" };
+        return format!("1: {why}");
+    };
+    let counted = match (lines.tests.tests_shapes(), lines.tests.object, lines.tests.shader) {
+        (true, ..) => "each time a ray meets one",
+        (false, true, true) => "each object and material once",
+        (false, true, false) => "each object once",
+        (false, false, _) => "each material once",
+    };
+    let hidden = match &settings.hidden {
+        None => String::new(),
+        Some(hidden) => {
+            let of = match &hidden.objects {
+                None => "all objects".to_owned(),
+                Some(objects) if objects.len() == 1 => "1 object".to_owned(),
+                Some(objects) => format!("{} objects", objects.len()),
+            };
+            format!("; hidden lines of {of}, {} px wide", hidden.width)
+        }
+    };
+    format!("up to {}, as `lines.surfaces` asks: {counted}{hidden}", plan.surfaces)
 }
 
 fn columns(plan: &Plan) -> Vec<&'static str> {

@@ -13,7 +13,7 @@ use tusche::scene::{Scene, file};
 use tusche::shade::{Host, Lighting, Shaders};
 use tusche::trace::{TileTracer, TraceContext, World};
 
-use crate::common::{Picture, render_with, root};
+use crate::common::{Picture, render_with, root, scripted_scene as scene};
 
 /// One sample that looks along −z at the origin, from 5 units away.
 const PROBE: &str = r#"
@@ -37,24 +37,6 @@ fn ball(settings: &str) -> String {
          position = [0.0, 0.0, 5.0]\ntarget = [0.0, 0.0, 0.0]\nfov = 26.0\n\
          [[objects]]\nshape = \"sphere\"\nmaterial = \"m\"\nsegments = [128, 64]\n"
     )
-}
-
-/// A scene with materials: their names, and the text of their `surface(hit, p)`.
-fn scene(text: &str, shaders: &[(&str, &str)]) -> Scene {
-    let folder = root().join("scenes");
-    // Without the key a scene gets lights by default.
-    let dark = if text.contains("[[lights]]") { "" } else { "lights = []\n" };
-    let mut text = format!("{dark}{text}");
-    let mut files = FileStore::new();
-    for (name, body) in shaders {
-        text += &format!("\n[materials.{name}]\nshader = \"{name}.rhai\"\n");
-        files = files.with_file(folder.join(format!("{name}.rhai")), format!("fn surface(hit, p) {{ {body} }}"));
-    }
-    let path = folder.join("light_test.toml");
-    let files = files.with_file(&path, text.as_str());
-    file::load(&path, &files, &[], &file::LoadOptions::default())
-        .and_then(|(builder, _)| builder.build())
-        .unwrap_or_else(|faults| panic!("the scene is at fault:\n{faults}\n\n{text}"))
 }
 
 fn render(text: &str, shaders: &[(&str, &str)], layers: &[Layer]) -> (Picture, Report) {

@@ -8,7 +8,7 @@ use tusche::scene::Scene;
 
 use crate::common::{render_with, scene_from, shipped_scenes};
 
-const LAYERS: [Layer; 5] = [Layer::Rgba, Layer::Color, Layer::Line, Layer::Depth, Layer::Object];
+const LAYERS: [Layer; 6] = [Layer::Rgba, Layer::Color, Layer::Line, Layer::HiddenLine, Layer::Depth, Layer::Object];
 
 /// A shipped scene, small and quick.
 fn small(path: &std::path::Path) -> Scene {

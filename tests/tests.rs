@@ -21,5 +21,6 @@ mod trace;
 // ... and the whole.
 mod flicker;
 mod same_bits;
+mod surfaces;
 mod truth;
 mod why;

@@ -12,6 +12,7 @@ use tusche::scene::{Object, Scene, SceneBuilder};
 use tusche::trace::World;
 use tusche::trace::surface::Surface;
 use tusche::trace::triangle::Ray;
+use tusche::trace::world::Hit;
 
 fn builder() -> SceneBuilder {
     let mut builder = SceneBuilder::default();
@@ -191,6 +192,63 @@ fn of_surfaces_at_one_depth_the_lowest_object_and_triangle_counts() {
         assert_eq!(hit.object.0, 0);
         assert!(hit.triangle < 2, "triangle {}", hit.triangle);
     }
+}
+
+/// The hits of a ray one after the other, at most `most`, of those that are `same` only the first.
+fn one_by_one(world: &World, ray: &Ray, most: usize, same: impl Fn(&Hit, &Hit) -> bool) -> Vec<Hit> {
+    let mut hits: Vec<Hit> = Vec::new();
+    let mut after = None;
+    while let Some(hit) = world.next_hit(ray, RayKinds::CAMERA, f32::INFINITY, after)
+        && hits.len() < most
+    {
+        after = Some(hit.rank());
+        if !hits.iter().any(|known| same(known, &hit)) {
+            hits.push(hit);
+        }
+    }
+    hits
+}
+
+#[test]
+fn the_first_hits_of_a_ray_are_those_found_one_by_one() {
+    let square = |z: f32| Mesh {
+        positions: [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]].map(|[x, y]| Vec3::new(x, y, z)).to_vec(),
+        triangles: vec![[0, 1, 2], [0, 2, 3], [0, 1, 2], [0, 2, 3]],
+        ..Mesh::default()
+    };
+    let mut builder = builder();
+    // Closed bodies within each other, and squares at one depth, each of them twice.
+    for index in 0..6 {
+        let at = DVec3::new(0.3 * f64::from(index), 0.1, -0.2 * f64::from(index));
+        place(&mut builder, ball(16, 24, 1.0), DAffine3::from_translation(at));
+        place(&mut builder, square(0.0), DAffine3::IDENTITY);
+    }
+    let (_, world) = world(builder);
+    let mut state = 5;
+    let mut hits = Vec::new();
+    let (mut longest, mut ties) = (0, 0);
+    for _ in 0..3_000 {
+        let target = Vec3::new(random(&mut state), random(&mut state), 0.3 * random(&mut state));
+        let ray = Ray::new(Vec3::ZERO, (target - world.origin.as_vec3()).normalize());
+        for most in [1, 2, 3, 5, 16, 64] {
+            world.first_hits(&ray, RayKinds::CAMERA, (None, &[]), most, |_, _| false, &mut hits);
+            assert_eq!(hits, one_by_one(&world, &ray, most, |_, _| false), "{most} hits");
+            assert_eq!(hits.first().copied(), world.closest(&ray, RayKinds::CAMERA, f32::INFINITY));
+            longest = longest.max(hits.len());
+            ties += hits.windows(2).filter(|pair| pair[0].t == pair[1].t).count();
+            let same = |a: &Hit, b: &Hit| a.object == b.object;
+            world.first_hits(&ray, RayKinds::CAMERA, (None, &[]), most, same, &mut hits);
+            assert_eq!(hits, one_by_one(&world, &ray, most, same), "{most} objects");
+        }
+        // What is absent is as if it were not there; so is all up to a rank.
+        let all = one_by_one(&world, &ray, 64, |_, _| false);
+        if let [first, second, rest @ ..] = &all[..] {
+            let absent = [second.rank()];
+            world.first_hits(&ray, RayKinds::CAMERA, (Some(first.rank()), &absent), 64, |_, _| false, &mut hits);
+            assert_eq!(hits, rest);
+        }
+    }
+    assert!(longest > 16 && ties > 10_000, "{longest} hits, {ties} ties");
 }
 
 #[test]

@@ -38,7 +38,9 @@ impl Request {
         }
         let files = outputs
             .iter()
-            .map(|path| Ok(PictureFile { path: path.clone(), layers: layers_for(path, &arguments.layer, &shaders)? }))
+            .map(|path| {
+                Ok(PictureFile { path: path.clone(), layers: layers_for(path, &arguments.layer, &scene, &shaders)? })
+            })
             .collect::<Result<Vec<_>, Diagnostic>>()?;
         let plan = Plan::new(&scene, &shaders, &layers_of(&files));
         Ok(Self { scene, shaders, plan, files, load_seconds: clock.seconds() })
@@ -99,7 +101,7 @@ fn load(
 }
 
 /// The layers of an output: those asked for, or a PNG's `rgba` and everything but parts of others (`line.TYPE`, `line.PATH`, `below`) for an EXR.
-fn layers_for(path: &Path, asked: &[String], shaders: &Shaders) -> Result<Vec<Layer>, Diagnostic> {
+fn layers_for(path: &Path, asked: &[String], scene: &Scene, shaders: &Shaders) -> Result<Vec<Layer>, Diagnostic> {
     let is_exr = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("exr"));
     let aovs = shaders.aovs();
     if !asked.is_empty() {
@@ -119,6 +121,9 @@ fn layers_for(path: &Path, asked: &[String], shaders: &Shaders) -> Result<Vec<La
         Layer::Uv,
         Layer::Object,
     ];
+    if scene.lines().hidden.is_some() {
+        layers.push(Layer::HiddenLine);
+    }
     if shaders.iter().any(|shader| shader.analysis().output(OutputSet::FEATURE).may) {
         layers.push(Layer::Feature);
     }

@@ -38,8 +38,11 @@ pub struct FilmWindow<'a> {
 #[must_use]
 pub fn develop(window: &FilmWindow<'_>, rect: PixelRect, filter: &Filter, layers: &[Layer]) -> FilmTile {
     let sources = rect.grown(filter.reach());
-    let mut has_lines = false;
-    window.visit(sources, |pixel| has_lines |= !pixel.lines.is_empty());
+    let (mut has_lines, mut has_hidden) = (false, false);
+    window.visit(sources, |pixel| {
+        has_lines |= !pixel.lines.is_empty();
+        has_hidden |= pixel.lines.iter().any(|line| line.hidden);
+    });
 
     // Which fields have to be filtered, each once, and which of them a layer shows.
     let mut fields = Vec::new();
@@ -53,16 +56,21 @@ pub fn develop(window: &FilmWindow<'_>, rect: PixelRect, filter: &Filter, layers
             }))
         })
         .collect();
-    let covered = (has_lines && layers.contains(&Layer::Below)).then(|| {
-        let lines = Field::Lines(Shown::All);
-        fields.iter().position(|field| *field == lines).unwrap_or_else(|| {
-            fields.push(lines);
+    // What lies under lines is brought from the share of the pixel that they leave to the whole of it.
+    let all = if has_hidden { Shown::All } else { Shown::Visible };
+    let covers = [(Field::Below, all), (Field::Lines(Shown::Hidden), Shown::Visible)];
+    let covers = covers.map(|(under, cover)| {
+        let under = fields.iter().position(|field| *field == under).filter(|_| has_lines)?;
+        let cover = Field::Lines(cover);
+        let cover = fields.iter().position(|field| *field == cover).unwrap_or_else(|| {
+            fields.push(cover);
             fields.len() - 1
-        })
+        });
+        Some((under, cover))
     });
     let mut filtered = filter_fields(window, rect, filter, &fields);
-    if let Some(covered) = covered {
-        uncover(&fields, &mut filtered, covered);
+    for (under, cover) in covers.into_iter().flatten() {
+        uncover(&mut filtered, under, cover);
     }
 
     let mut channels = Vec::new();
@@ -89,14 +97,13 @@ pub fn develop(window: &FilmWindow<'_>, rect: PixelRect, filter: &Filter, layers
     FilmTile { rect, channels }
 }
 
-/// Brings the colours below the lines from the share of the pixel that they fill to the whole pixel.
-fn uncover(fields: &[Field], filtered: &mut [Vec<Vec4>], covered: usize) {
-    // Below this, nothing of the quotient is seen under the line.
+/// Brings the values of a field from the share of each pixel that a cover leaves to the whole pixel.
+fn uncover(filtered: &mut [Vec<Vec4>], under: usize, cover: usize) {
+    // Below this, nothing of the quotient is seen under the cover.
     const LEAST: f32 = 1e-4;
-    let Some(below) = fields.iter().position(|field| *field == Field::Below) else { return };
-    for pixel in 0..filtered[below].len() {
-        let share = 1.0 - filtered[covered][pixel].w;
-        filtered[below][pixel] = if share > LEAST { filtered[below][pixel] / share } else { Vec4::ZERO };
+    for pixel in 0..filtered[under].len() {
+        let share = 1.0 - filtered[cover][pixel].w;
+        filtered[under][pixel] = if share > LEAST { filtered[under][pixel] / share } else { Vec4::ZERO };
     }
 }
 
@@ -237,6 +244,8 @@ enum Field {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Shown {
     All,
+    Visible,
+    Hidden,
     OfType(LineType),
     AtPath(LinePath),
 }
@@ -245,8 +254,10 @@ impl Shown {
     fn contains(self, line: &SeenLine) -> bool {
         match self {
             Self::All => true,
-            Self::OfType(kind) => LineType::of(line.fired) == Some(kind),
-            Self::AtPath(path) => LinePath::of(line.path) == path,
+            Self::Visible => !line.hidden,
+            Self::Hidden => line.hidden,
+            Self::OfType(kind) => !line.hidden && LineType::of(line.fired) == Some(kind),
+            Self::AtPath(path) => !line.hidden && LinePath::of(line.path) == path,
         }
     }
 }
@@ -269,7 +280,8 @@ impl Field {
             Layer::Rgba | Layer::Color => Some(Self::Plain),
             Layer::Below if has_lines => Some(Self::Below),
             Layer::Below => Some(Self::Plain),
-            Layer::Line => has_lines.then_some(Self::Lines(Shown::All)),
+            Layer::Line => has_lines.then_some(Self::Lines(Shown::Visible)),
+            Layer::HiddenLine => has_lines.then_some(Self::Lines(Shown::Hidden)),
             Layer::LineType(kind) => has_lines.then_some(Self::Lines(Shown::OfType(*kind))),
             Layer::LinePath(path) => has_lines.then_some(Self::Lines(Shown::AtPath(*path))),
             Layer::Aov(index, _) => Some(Self::Aov(*index)),
@@ -345,6 +357,7 @@ fn nearest_value(layer: &Layer) -> Option<fn(&SampleBuffer, usize) -> [f32; 3]> 
         | Layer::Line
         | Layer::LineType(_)
         | Layer::LinePath(_)
+        | Layer::HiddenLine
         | Layer::Below
         | Layer::Aov(..) => None,
     }

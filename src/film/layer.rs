@@ -14,14 +14,17 @@ pub enum Layer {
     Rgba,
     /// The picture without lines, premultiplied: `color.R G B A`.
     Color,
-    /// The lines alone, premultiplied: `line.R G B A`.
+    /// The lines alone, premultiplied: `line.R G B A`. Hidden ones are not among them.
     Line,
     /// The lines of one type alone, premultiplied: `line.TYPE.R G B A`.
     LineType(LineType),
     /// The lines at the ends of one kind of path alone, premultiplied: `line.camera.R G B A`, `line.reflection.R G B A`,
     /// `line.refraction.R G B A`.
     LinePath(LinePath),
-    /// What lies below the lines, premultiplied: `below.R G B A`. The layer `line` *over* this one is `rgba`, also in pixels
+    /// The lines of hidden surfaces alone, premultiplied: `line.hidden.R G B A`. In pixels that a visible line partly covers,
+    /// they are brought to the share of the pixel that it leaves: `line` *over* this layer *over* `below` is `rgba`.
+    HiddenLine,
+    /// What lies below the lines, premultiplied: `below.R G B A`. The layer `line` (*over* `line.hidden`, if there are hidden lines) *over* this one is `rgba`, also in pixels
     /// that a line only partly covers, where `color` would be wrong: it holds the colours under the line, too. (With
     /// `compose = "throughput"`, only where no reflected or refracted line is.)
     Below,
@@ -92,7 +95,7 @@ const AOV_PREFIX: &str = "aov_";
 
 impl Layer {
     /// All layers but the scripts' own, in the order of the documentation.
-    pub const FIXED: [Self; 20] = [
+    pub const FIXED: [Self; 21] = [
         Self::Rgba,
         Self::Color,
         Self::Line,
@@ -106,6 +109,7 @@ impl Layer {
         Self::LinePath(LinePath::Camera),
         Self::LinePath(LinePath::Reflection),
         Self::LinePath(LinePath::Refraction),
+        Self::HiddenLine,
         Self::Below,
         Self::Depth,
         Self::Normal,
@@ -145,9 +149,13 @@ impl Layer {
     #[must_use]
     pub fn channels(&self) -> Vec<Channel> {
         let (components, format): (&[&str], _) = match self {
-            Self::Rgba | Self::Color | Self::Line | Self::LineType(_) | Self::LinePath(_) | Self::Below => {
-                (RGBA, ChannelFormat::Half)
-            }
+            Self::Rgba
+            | Self::Color
+            | Self::Line
+            | Self::LineType(_)
+            | Self::LinePath(_)
+            | Self::HiddenLine
+            | Self::Below => (RGBA, ChannelFormat::Half),
             Self::Depth => (&["Z"], ChannelFormat::Float),
             Self::Normal | Self::Position => (XYZ, ChannelFormat::Float),
             Self::Uv => (&["U", "V"], ChannelFormat::Float),
@@ -177,6 +185,7 @@ impl fmt::Display for Layer {
             Self::LinePath(LinePath::Camera) => "line.camera",
             Self::LinePath(LinePath::Reflection) => "line.reflection",
             Self::LinePath(LinePath::Refraction) => "line.refraction",
+            Self::HiddenLine => "line.hidden",
             Self::Below => "below",
             Self::Depth => "Z",
             Self::Normal => "N",

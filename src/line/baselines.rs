@@ -156,6 +156,7 @@ fn plain_line(rules: &Rules, fired: Fired, neighbor: ([i32; 2], u32)) -> SeenLin
         fired,
         neighbor,
         own: true,
+        hidden: false,
     }
 }
 

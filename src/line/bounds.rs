@@ -9,6 +9,7 @@
 //! test reads them: what is scanned most stays small.
 
 use super::differ::Tests;
+use super::list::bounds::LayerBounds;
 use super::overlap::{Facet, FacetBounds};
 use super::pair::Rank;
 use super::rules::Rules;
@@ -47,6 +48,7 @@ impl TileBounds {
                 + size_of_val(&path.facets[..])
                 + size_of_val(&path.by_rank[..])
                 + size_of_val(&path.blocks[..])
+                + path.behind.iter().map(LayerBounds::bytes).sum::<usize>()
         };
         self.paths.iter().map(|path| size_of::<PathBounds>() + of_path(path)).sum()
     }
@@ -124,7 +126,7 @@ impl Shape {
     pub(super) const EMPTY: Self = Self { uv: Extent::EMPTY, normal: Extent::EMPTY, feature: Extent::EMPTY };
 
     #[inline]
-    fn union(&self, other: &Self) -> Self {
+    pub(super) fn union(&self, other: &Self) -> Self {
         Self {
             uv: self.uv.union(&other.uv),
             normal: self.normal.union(&other.normal),
@@ -157,7 +159,7 @@ impl Shape {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Bounds {
     /// Smallest and largest.
-    object: [u32; 2],
+    pub object: [u32; 2],
     /// Smallest and largest.
     shader: [u32; 2],
     /// The highest rank of a node that draws a line, or [`Rank::LAST`].
@@ -197,7 +199,7 @@ impl Bounds {
         self.object[0] <= other.object[1] && other.object[0] <= self.object[1] && self.object[1] > 0
     }
 
-    const EMPTY: Self = Self {
+    pub(super) const EMPTY: Self = Self {
         object: [u32::MAX, 0],
         shader: [u32::MAX, 0],
         best: Rank::LAST,
@@ -209,7 +211,7 @@ impl Bounds {
     };
 
     #[inline]
-    fn union(&self, other: &Self, nodes: &NodeColumns, rules: &Rules) -> Self {
+    pub(super) fn union(&self, other: &Self, nodes: &NodeColumns, rules: &Rules) -> Self {
         let range = |a: [u32; 2], b: [u32; 2]| [a[0].min(b[0]), a[1].max(b[1])];
         Self {
             object: range(self.object, other.object),
@@ -318,6 +320,8 @@ pub(super) struct PathBounds {
     /// For each block its pixels from the highest best rank down, counted from its first: the search cuts off at the
     /// first that is too low.
     pub by_rank: Vec<u8>,
+    /// What is known of the surfaces behind, by place in their lists.
+    pub behind: Vec<LayerBounds>,
 }
 
 impl PathBounds {
@@ -333,6 +337,7 @@ impl PathBounds {
             shapes: Vec::new(),
             facets: Vec::new(),
             by_rank: Vec::new(),
+            behind: Vec::new(),
         };
         let rect = buffer.rect;
         for y0 in (rect.y0..rect.y1).step_by(BLOCK as usize) {
@@ -341,6 +346,8 @@ impl PathBounds {
                 all.add_block(block, buffer, nodes, rules);
             }
         }
+        let layers = nodes.behind.iter().take(rules.surfaces().saturating_sub(1));
+        all.behind = layers.map(|layer| LayerBounds::new(&all, buffer, layer, rules)).collect();
         all
     }
 
@@ -359,7 +366,7 @@ impl PathBounds {
                     pixel,
                     first,
                     end: last,
-                    bounds: self.of_rows(nodes, start, end, rules),
+                    bounds: of_rows(&self.radius_squared, nodes, start, end, rules),
                 });
                 if tests.reads_shapes {
                     self.shapes.push(shape_of_rows(nodes, start, end, tests));
@@ -386,70 +393,6 @@ impl PathBounds {
         self.blocks.push(Block { rect, bounds, shape, facets, first: first as u32, end: self.pixels.len() as u32 });
     }
 
-    /// Column by column: most are constant.
-    fn of_rows(&self, nodes: &NodeColumns, first: usize, end: usize, rules: &Rules) -> Bounds {
-        let mut bounds = Bounds { object: range(&nodes.object, first, end), ..Bounds::EMPTY };
-        bounds.shader = range(&nodes.shader, first, end);
-        if let (Column::Constant(priority), Column::Values(depths)) = (&nodes.priority, &nodes.depth) {
-            let (mut low, mut high) = (f32::INFINITY, f32::NEG_INFINITY);
-            for &depth in &depths[first..end] {
-                low = low.min(depth);
-                high = high.max(depth);
-            }
-            bounds.highest = Rank::new(*priority, low);
-            bounds.lowest = Rank::new(*priority, high);
-        } else {
-            for row in first..end {
-                let rank = Rank::new(nodes.priority.get(row), nodes.depth.get(row));
-                bounds.highest = bounds.highest.better(rank);
-                bounds.lowest = bounds.lowest.worse(rank);
-            }
-        }
-        let (mut narrow, mut wide) = (f32::INFINITY, 0.0_f32);
-        match &self.radius_squared {
-            Column::Constant(radius) => (narrow, wide) = (*radius, *radius),
-            radii => {
-                for radius in (first..end).map(|row| radii.get(row)) {
-                    narrow = narrow.min(radius);
-                    wide = wide.max(radius);
-                }
-            }
-        }
-        bounds.radius_squared = rules.widest_squared(wide);
-        if narrow > 0.0 {
-            bounds.best = bounds.highest;
-            bounds.thinnest_squared = narrow;
-        } else if wide > 0.0 {
-            for row in first..end {
-                let radius = self.radius_squared.get(row);
-                if radius > 0.0 {
-                    bounds.best = bounds.best.better(Rank::new(nodes.priority.get(row), nodes.depth.get(row)));
-                    bounds.thinnest_squared = bounds.thinnest_squared.min(radius);
-                }
-            }
-        }
-        if bounds.thinnest_squared < f32::INFINITY {
-            bounds.thinnest_squared = rules.thinnest_squared(bounds.thinnest_squared);
-        }
-        bounds.stylist = self.stylist(nodes, first, end, rules);
-        bounds
-    }
-
-    fn stylist(&self, nodes: &NodeColumns, first: usize, end: usize, rules: &Rules) -> Stylist {
-        let Some(row) = (first..end).find(|row| self.radius_squared.get(*row) > 0.0) else { return Stylist::None };
-        let own = style(nodes, row, rules);
-        // What is seen through a line depends on the pair.
-        let opaque = own.is_opaque(rules);
-        let alike = match (&nodes.line_color, &nodes.line_width, &nodes.line_opacity) {
-            (Column::Constant(_), Column::Constant(_), Column::Constant(_)) if rules.no_scripts() => opaque,
-            _ => {
-                let mut others = (row + 1..end).filter(|row| self.radius_squared.get(*row) > 0.0);
-                opaque && others.all(|row| style(nodes, row, rules) == own)
-            }
-        };
-        if alike { Stylist::Alike(row as u32) } else { Stylist::Many }
-    }
-
     pub(super) fn bounded(&self) -> Bounded<'_> {
         Bounded { bounds: &self.bounds, shape: &self.shape, facets: &self.facets_of_all }
     }
@@ -463,6 +406,76 @@ impl PathBounds {
             facets: self.facets.get(place).unwrap_or(&FacetBounds::EMPTY),
         }
     }
+}
+
+/// The bounds of some rows. Column by column: most are constant.
+pub(super) fn of_rows(
+    radii_squared: &Column<f32>,
+    nodes: &NodeColumns,
+    first: usize,
+    end: usize,
+    rules: &Rules,
+) -> Bounds {
+    let mut bounds = Bounds { object: range(&nodes.object, first, end), ..Bounds::EMPTY };
+    bounds.shader = range(&nodes.shader, first, end);
+    if let (Column::Constant(priority), Column::Values(depths)) = (&nodes.priority, &nodes.depth) {
+        let (mut low, mut high) = (f32::INFINITY, f32::NEG_INFINITY);
+        for &depth in &depths[first..end] {
+            low = low.min(depth);
+            high = high.max(depth);
+        }
+        bounds.highest = Rank::new(*priority, low);
+        bounds.lowest = Rank::new(*priority, high);
+    } else {
+        for row in first..end {
+            let rank = Rank::new(nodes.priority.get(row), nodes.depth.get(row));
+            bounds.highest = bounds.highest.better(rank);
+            bounds.lowest = bounds.lowest.worse(rank);
+        }
+    }
+    let (mut narrow, mut wide) = (f32::INFINITY, 0.0_f32);
+    match radii_squared {
+        Column::Constant(radius) => (narrow, wide) = (*radius, *radius),
+        radii => {
+            for radius in (first..end).map(|row| radii.get(row)) {
+                narrow = narrow.min(radius);
+                wide = wide.max(radius);
+            }
+        }
+    }
+    bounds.radius_squared = rules.widest_squared(wide);
+    if narrow > 0.0 {
+        bounds.best = bounds.highest;
+        bounds.thinnest_squared = narrow;
+    } else if wide > 0.0 {
+        for row in first..end {
+            let radius = radii_squared.get(row);
+            if radius > 0.0 {
+                bounds.best = bounds.best.better(Rank::new(nodes.priority.get(row), nodes.depth.get(row)));
+                bounds.thinnest_squared = bounds.thinnest_squared.min(radius);
+            }
+        }
+    }
+    if bounds.thinnest_squared < f32::INFINITY {
+        bounds.thinnest_squared = rules.thinnest_squared(bounds.thinnest_squared);
+    }
+    bounds.stylist = stylist(radii_squared, nodes, first, end, rules);
+    bounds
+}
+
+fn stylist(radii_squared: &Column<f32>, nodes: &NodeColumns, first: usize, end: usize, rules: &Rules) -> Stylist {
+    let Some(row) = (first..end).find(|row| radii_squared.get(*row) > 0.0) else { return Stylist::None };
+    let own = style(nodes, row, rules);
+    // What is seen through a line depends on the pair.
+    let opaque = own.is_opaque(rules);
+    let alike = match (&nodes.line_color, &nodes.line_width, &nodes.line_opacity) {
+        (Column::Constant(_), Column::Constant(_), Column::Constant(_)) if rules.no_scripts() => opaque,
+        _ => {
+            let mut others = (row + 1..end).filter(|row| radii_squared.get(*row) > 0.0);
+            opaque && others.all(|row| style(nodes, row, rules) == own)
+        }
+    };
+    if alike { Stylist::Alike(row as u32) } else { Stylist::Many }
 }
 
 /// Smallest and largest id of some rows.
@@ -481,7 +494,7 @@ fn range(ids: &Column<u32>, first: usize, end: usize) -> [u32; 2] {
 }
 
 /// The shape of some rows, as far as tests read it.
-fn shape_of_rows(nodes: &NodeColumns, first: usize, end: usize, tests: &Tests) -> Shape {
+pub(super) fn shape_of_rows(nodes: &NodeColumns, first: usize, end: usize, tests: &Tests) -> Shape {
     let hits = |row: &usize| nodes.object.get(*row) != 0;
     Shape {
         uv: extent(&nodes.uv, first, end, tests.uv_squared, hits),
@@ -511,7 +524,7 @@ fn extent<const N: usize>(
 }
 
 /// The squared radius of each row's line. Widths mostly come in runs.
-fn radii_squared(widths: &Column<f32>, rules: &Rules) -> Column<f32> {
+pub(super) fn radii_squared(widths: &Column<f32>, rules: &Rules) -> Column<f32> {
     let mut last = (0.0, 0.0);
     widths.map(|width| {
         if width != last.0 {

@@ -1,4 +1,5 @@
-//! The definition as plain loops (DESIGN section 3.2), to be read beside the text. The oracle of [`super::search`].
+//! The definition as plain loops (DESIGN section 3.2), to be read beside the text. The oracle of [`super::search`]. For
+//! lists of surfaces see [`super::list`].
 
 use super::pair::{Found, MOST_LINES, Pair, Taken, distance_squared, fired, is_opaque};
 use super::window::{PathTile, PathWindow};
@@ -32,7 +33,7 @@ pub(super) fn find(
             taken.take(&neighbors.features(pair.row as usize), pair.own);
         }
         if let Some((pair, behind)) = pairs.split_first() {
-            found.push(Found { row, path: targets.nodes.path, pair: *pair, behind: behind.to_vec() });
+            found.push(Found { row, path: targets.nodes.path, pair: *pair, hidden: false, behind: behind.to_vec() });
         }
     }
     found
@@ -79,8 +80,15 @@ fn seen(
                     continue;
                 }
                 // Of all valid pairs the seen one minimises −priority_p, depth_p, |x_t − x_n|, index of n.
-                let pair =
-                    Pair { rank: p.rank, distance_squared, pixel, tile: segment.index as u32, row: row as u32, own };
+                let pair = Pair {
+                    rank: p.rank,
+                    distance_squared,
+                    pixel,
+                    tile: segment.index as u32,
+                    row: row as u32,
+                    surface: 0,
+                    own,
+                };
                 if seen.is_none_or(|best| pair.beats(&best)) {
                     seen = Some(pair);
                 }

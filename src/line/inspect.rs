@@ -4,7 +4,7 @@
 
 use super::overlap::Facet;
 use super::pair::{LineNode, distance_squared, fired, type_of};
-use super::window::{LineTile, PathTile};
+use super::window::{LineTile, PathTile, alpha};
 use super::{Fired, Rules};
 use crate::math::portable;
 use crate::sample::NodePath;
@@ -124,7 +124,7 @@ impl Sides<'_> {
             distance: distance_squared(&t, n.pixel, n.offset).sqrt(),
             radius,
             effective_width: if radius > 0.0 { width.min(rules.widest()).max(minimum) } else { 0.0 },
-            alpha: stylist.alpha(styling, kind, rules),
+            alpha: alpha(stylist.nodes, styling, kind, rules),
         }
     }
 

@@ -6,7 +6,8 @@
 //! size, threads and method change no bit.
 //!
 //! `brute` is the definition as plain loops and the oracle for `search`, which gives the same bits much sooner. What
-//! decides is shared by both: `differ`, `overlap`, `materials`, `pair`, [`Rules`]. `bounds` and `lanes` are the search's: what is known of many nodes
+//! decides is shared by both: `differ`, `overlap`, `materials`, `pair`, [`Rules`]. `list` holds both once more for lists of
+//! surfaces (DESIGN section 3.4). `bounds` and `lanes` are the search's: what is known of many nodes
 //! at once, and the loops over neighbours that are left.
 
 mod baselines;
@@ -15,6 +16,7 @@ mod brute;
 mod differ;
 mod inspect;
 mod lanes;
+mod list;
 mod materials;
 mod overlap;
 mod pair;
@@ -34,6 +36,7 @@ pub use window::{LineTile, Window};
 pub use crate::scene::settings::LineType;
 
 use crate::sample::{GateCounts, NodePath, PixelRect};
+use list::Kind;
 use pair::LineNode;
 use window::PathTile;
 
@@ -69,6 +72,8 @@ pub struct SeenLine {
     pub neighbor: ([i32; 2], u32),
     /// Whether the target's own line attributes style it (else the neighbour's do).
     pub own: bool,
+    /// Whether it is the line of a surface behind the sample's first, in the style of `[lines.hidden]`.
+    pub hidden: bool,
 }
 
 /// The lines of a rectangle: which samples see one, in the order of samples.
@@ -91,14 +96,17 @@ pub struct LineBuffer {
 pub struct LineCounts {
     /// Target–neighbour pairs whose attributes or distance were looked at.
     pub pairs_tested: u64,
-    /// Samples that see a line.
+    /// Samples that see a line, hidden ones included.
     pub lined_samples: u64,
+    /// Samples that see a hidden line.
+    pub hidden_samples: u64,
 }
 
 impl std::ops::AddAssign for LineCounts {
     fn add_assign(&mut self, other: Self) {
         self.pairs_tested += other.pairs_tested;
         self.lined_samples += other.lined_samples;
+        self.hidden_samples += other.hidden_samples;
     }
 }
 
@@ -125,28 +133,53 @@ pub fn find_lines(
     let mut lines: Vec<(u32, SeenLine)> = Vec::new();
     let mut counts = LineCounts::default();
     let mut gate = Vec::new();
-    for nodes in &target.buffer.paths {
+    let lists = rules.surfaces() > 1;
+    // Hidden lines come last: they are drawn where no visible line of any path is.
+    let passes = target.buffer.paths.iter().map(|nodes| (nodes, Kind::Visible));
+    let hidden = rules.hidden().map_or(&[][..], |_| &target.buffer.paths);
+    for (nodes, kind) in passes.chain(hidden.iter().map(|nodes| (nodes, Kind::Hidden))) {
         let Some(targets) = PathTile::new(target, nodes.path) else { continue };
-        let window = window.at_path(nodes.path);
+        let at_path = window.at_path(nodes.path);
         let found = match method {
-            Method::Exact => search::find(&window, &targets, &lined, rules, &mut counts),
-            Method::Brute => brute::find(&window, &targets, &lined, rules, &mut counts),
+            Method::Exact if !lists => search::find(&at_path, &targets, &lined, rules, &mut counts),
+            Method::Brute if !lists => brute::find(&at_path, &targets, &lined, rules, &mut counts),
+            Method::Exact | Method::Brute => {
+                let search = list::Search { window: &at_path, targets: &targets, rules, kind };
+                let skipped =
+                    if kind == Kind::Hidden { seen_through(target, nodes.path, &lined) } else { lined.clone() };
+                if method == Method::Brute {
+                    list::brute::find(&search, &skipped, &mut counts)
+                } else {
+                    list::search::find(&search, &skipped, &mut counts)
+                }
+            }
             Method::Choudhury => {
-                lines = baselines::choudhury(&window, &targets, rules, &mut counts);
+                lines = baselines::choudhury(&at_path, &targets, rules, &mut counts);
                 break;
             }
             Method::Bauer => {
-                lines = baselines::bauer(&window, &targets, rules, &mut counts);
+                lines = baselines::bauer(&at_path, &targets, rules, &mut counts);
                 break;
             }
         };
-        for (sample, line) in style::style(&window, &targets, &found, rules, scripts.as_deref_mut(), &mut gate) {
+        for (sample, line) in style::style(&at_path, &targets, &found, rules, scripts.as_deref_mut(), &mut gate) {
             lined[sample as usize] = true;
             lines.push((sample, line));
         }
     }
     lines.sort_unstable_by_key(|&(sample, _)| sample);
     counts.lined_samples = lines.len() as u64;
+    counts.hidden_samples = lines.iter().filter(|(_, line)| line.hidden).count() as u64;
     let (samples, lines) = lines.into_iter().unzip();
     LineBuffer { rect: target.buffer.rect, samples, lines, counts, gate }
+}
+
+/// The samples that look for no hidden line at a path: those that have a line, and those whose rays go on through the
+/// surface there. It hides nothing; what lies behind it is looked at where they arrive.
+fn seen_through(target: LineTile<'_>, path: NodePath, lined: &[bool]) -> Vec<bool> {
+    let mut skipped = lined.to_vec();
+    if let Some(through) = target.buffer.nodes(path.refracted()) {
+        (0..through.rows.len()).for_each(|row| skipped[through.rows.sample(row) as usize] = true);
+    }
+    skipped
 }

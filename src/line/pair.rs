@@ -3,7 +3,7 @@
 
 use super::differ::{Features, Fired};
 use super::overlap::Facet;
-use super::window::PathTile;
+use super::window::{PathTile, alpha};
 use super::{LineType, Rules};
 use crate::sample::NodePath;
 
@@ -95,7 +95,8 @@ pub(super) fn is_opaque(
 ) -> bool {
     let (nodes, row) = if own { target } else { neighbor };
     // What a script makes of it is not known yet.
-    !rules.is_scripted(nodes.nodes.shader.get(row)) && nodes.alpha(row, type_of(rules, target, neighbor), rules) >= 1.0
+    !rules.is_scripted(nodes.nodes.shader.get(row))
+        && alpha(nodes.nodes, row, type_of(rules, target, neighbor), rules) >= 1.0
 }
 
 /// Which tests find a difference between a target and a neighbour, each with its tile and row: those of the priority
@@ -144,6 +145,8 @@ pub(super) struct Pair {
     pub tile: u32,
     /// The neighbour's row in its tile.
     pub row: u32,
+    /// Which surface of the priority sample's list styles the line: 0 for the first.
+    pub surface: u32,
     /// Whether the target is the priority sample.
     pub own: bool,
 }
@@ -158,20 +161,23 @@ impl Pair {
         if self.distance_squared != other.distance_squared {
             return self.distance_squared < other.distance_squared;
         }
-        // Rows of a pixel are in the order of its samples.
-        let index = |pair: &Self| (pair.pixel[1], pair.pixel[0], pair.row);
+        // Rows of a pixel are in the order of its samples; the lines of one neighbour come
+        // before the target's own, in the order of its list.
+        let index = |pair: &Self| (pair.pixel[1], pair.pixel[0], pair.row, pair.own, pair.surface);
         index(self) < index(other)
     }
 }
 
 /// The line that a target sees, before styling.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) struct Found {
     /// The target's row at the path.
     pub row: usize,
     /// The path.
     pub path: NodePath,
     pub pair: Pair,
+    /// Whether it is the line of a hidden surface, in their style.
+    pub hidden: bool,
     /// What is seen through it, front to back, if it is not opaque.
     pub behind: Vec<Pair>,
 }

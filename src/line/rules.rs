@@ -22,6 +22,27 @@ pub struct Rules {
     /// By `shader` value: whose lines a script styles one by one.
     scripted: Vec<bool>,
     exact_pairs: bool,
+    hidden: Option<HiddenStyle>,
+}
+
+/// How hidden lines are drawn.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct HiddenStyle {
+    /// Linear.
+    pub color: [f32; 3],
+    /// Square of the half width, 0 if nothing is drawn.
+    pub radius_squared: f32,
+    /// How much a line covers.
+    pub alpha: f32,
+    /// Object ids as nodes have them, rising; `None` for all.
+    objects: Option<Vec<u32>>,
+}
+
+impl HiddenStyle {
+    /// Whether hidden lines of an object, by its id as nodes have it, are drawn.
+    pub(super) fn draws(&self, object: u32) -> bool {
+        self.objects.as_ref().is_none_or(|objects| objects.binary_search(&object).is_ok())
+    }
 }
 
 impl Rules {
@@ -32,7 +53,7 @@ impl Rules {
         // jittered samples.
         let per_side = 3.0 / (4.0 * samples_per_pixel.max(1) as f32);
         let unit_gap = 0.84 * portable::pow(per_side, 2.0 / 3.0) / portable::cbrt(2.0);
-        let rules = Self {
+        let mut rules = Self {
             widest: settings.max_width.max(0.0),
             unit_gap: f64::from(unit_gap),
             tests: Tests::new(settings),
@@ -40,12 +61,24 @@ impl Rules {
             types: None,
             scripted: Vec::new(),
             exact_pairs: true,
+            hidden: None,
             settings: settings.clone(),
         };
-        Self { types: TypeRules::new(&rules), ..rules }
+        rules.types = TypeRules::new(&rules);
+        rules.hidden = settings.hidden.as_ref().filter(|_| settings.surfaces > 1).map(|hidden| HiddenStyle {
+            color: hidden.color.to_array(),
+            radius_squared: rules.radius(hidden.width) * rules.radius(hidden.width),
+            alpha: rules.alpha(hidden.width),
+            objects: hidden.objects.as_ref().map(|objects| {
+                let mut ids: Vec<u32> = objects.iter().map(|id| id.0 + 1).collect();
+                ids.sort_unstable();
+                ids
+            }),
+        });
+        rules
     }
 
-    /// The same rules, knowing that no width in the picture is above `width` pixels: less reach, so smaller halos. A
+    /// The same rules, knowing that no width that a shader gives is above `width` pixels: less reach, so smaller halos. A
     /// wider line counts as this wide.
     #[must_use]
     pub fn with_widest(mut self, width: f32) -> Self {
@@ -116,6 +149,16 @@ impl Rules {
         self.exact_pairs || self.types.is_some()
     }
 
+    /// How many surfaces a list holds at most.
+    pub(super) fn surfaces(&self) -> usize {
+        self.settings.surfaces as usize
+    }
+
+    /// How hidden lines are drawn, if any can be seen.
+    pub(super) fn hidden(&self) -> Option<&HiddenStyle> {
+        self.hidden.as_ref().filter(|hidden| hidden.radius_squared > 0.0)
+    }
+
     /// The settings that the rules were made from.
     #[must_use]
     pub fn settings(&self) -> &LineSettings {
@@ -176,7 +219,8 @@ impl Rules {
     /// How far a line reaches at most, in whole pixels: neighbours farther than this many pixels never matter.
     #[must_use]
     pub fn reach(&self) -> i32 {
-        self.radius(self.widest).ceil() as i32
+        let hidden = self.hidden().map_or(0.0, |hidden| hidden.radius_squared.sqrt());
+        self.radius(self.widest).max(hidden).ceil() as i32
     }
 
     /// Whether nodes at this path draw lines: the camera's if cameras do, any other if all kinds of its events do.

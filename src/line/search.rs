@@ -78,7 +78,7 @@ pub(super) fn find(
             for i in 0..search.targets.len() {
                 let Target { row, best: Some(pair), .. } = search.targets[i] else { continue };
                 let behind = search.search_behind(targets, place, i, pair);
-                found.push(Found { row, path: targets.nodes.path, pair, behind });
+                found.push(Found { row, path: targets.nodes.path, pair, hidden: false, behind });
             }
         }
     }
@@ -538,7 +538,7 @@ fn keep(window: &PathWindow<'_>, rules: &Rules, target: &mut Target, origin: &Or
     if distance_squared >= rules.widest_squared(asked_squared) {
         return;
     }
-    let pair = Pair { rank, distance_squared, pixel, tile, row, own };
+    let pair = Pair { rank, distance_squared, pixel, tile, row, surface: 0, own };
     if !target.best.is_none_or(|best| pair.beats(&best)) {
         return;
     }
@@ -577,7 +577,7 @@ struct OwnTargets {
 /// The smallest squared distance that [`distance_squared`] can give between a target in one rectangle and a neighbour in
 /// another.
 #[inline]
-fn rect_gap_squared(targets: &PixelRect, neighbors: &PixelRect) -> f32 {
+pub(super) fn rect_gap_squared(targets: &PixelRect, neighbors: &PixelRect) -> f32 {
     let gap = |t0: i32, t1: i32, n0: i32, n1: i32| (n0 - t1).max(t0 - n1).max(0) as f32;
     let x = gap(targets.x0, targets.x1, neighbors.x0, neighbors.x1);
     let y = gap(targets.y0, targets.y1, neighbors.y0, neighbors.y1);
@@ -586,7 +586,7 @@ fn rect_gap_squared(targets: &PixelRect, neighbors: &PixelRect) -> f32 {
 
 /// [`rect_gap_squared`] between two pixels.
 #[inline(always)]
-fn pixel_gap_squared(targets: [i32; 2], neighbors: [i32; 2]) -> f32 {
+pub(super) fn pixel_gap_squared(targets: [i32; 2], neighbors: [i32; 2]) -> f32 {
     let gap = |axis: usize| ((neighbors[axis] - targets[axis]).abs() - 1).max(0) as f32;
     let (x, y) = (gap(0), gap(1));
     x * x + y * y
@@ -600,6 +600,6 @@ fn far_squared(targets: [i32; 2], neighbors: [i32; 2]) -> f32 {
     x * x + y * y
 }
 
-fn pixel_rect([x, y]: [i32; 2]) -> PixelRect {
+pub(super) fn pixel_rect([x, y]: [i32; 2]) -> PixelRect {
     PixelRect { x0: x, y0: y, x1: x + 1, y1: y + 1 }
 }

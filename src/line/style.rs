@@ -2,6 +2,7 @@
 //!
 //! 1. Each pair of a sample has a colour and an opacity: those of its priority sample, changed by the line's type.
 //! 2. Where the priority sample's material has a script for lines, the script changes them: all lines of a material at once.
+//!    Hidden lines are left as they are.
 //! 3. The pairs are mixed into the sample's colour, from the back to the front.
 
 use std::collections::BTreeMap;
@@ -10,11 +11,11 @@ use smallvec::SmallVec;
 
 use super::differ::Fired;
 use super::pair::{Found, Pair, fired};
-use super::window::{PathTile, PathWindow};
-use super::{LineType, Rules, SeenLine};
+use super::window::{PathTile, PathWindow, alpha};
+use super::{LineType, Rules, SeenLine, list};
 use crate::math::{Vec3, luminance};
 use crate::sample::gate::clean_line_style;
-use crate::sample::{GateCounts, PairBatch, PairSide};
+use crate::sample::{GateCounts, NodeColumns, PairBatch, PairSide};
 use crate::scene::settings::{Composition, TypeStyle};
 
 /// Scripts that style lines one by one.
@@ -78,11 +79,14 @@ struct Styler<'s, 'a> {
 }
 
 impl Styler<'_, '_> {
-    /// Tile and row of the sample that styles a pair, and of the other one.
-    fn sides(&self, found: &Found, pair: &Pair) -> Option<[(&PathTile<'_>, usize); 2]> {
-        let neighbor = (self.window.tiles[pair.tile as usize].as_ref()?, pair.row as usize);
-        let target = (self.targets, found.row);
-        Some(if pair.own { [target, neighbor] } else { [neighbor, target] })
+    /// Columns and row of the surface that styles a pair, and of the first surface of the other sample.
+    fn sides(&self, found: &Found, pair: &Pair) -> Option<[(&NodeColumns, usize); 2]> {
+        let neighbors = self.window.tiles[pair.tile as usize].as_ref()?;
+        let row = pair.row as usize;
+        Some(match pair.own {
+            true => [self.targets.surface(found.row, pair.surface)?, (neighbors.nodes, row)],
+            false => [neighbors.surface(row, pair.surface)?, (self.targets.nodes, found.row)],
+        })
     }
 
     /// The lines of a sample before scripts, front to back.
@@ -94,15 +98,22 @@ impl Styler<'_, '_> {
     fn drawn_pair(&self, found: &Found, pair: &Pair) -> Option<Drawn> {
         let [(nodes, row), _] = self.sides(found, pair)?;
         let neighbors = self.window.tiles[pair.tile as usize].as_ref()?;
-        let target = self.targets.node(self.pixel(found), found.row);
-        let neighbor = neighbors.node(pair.pixel, pair.row as usize);
-        let of_neighbor = (neighbors, pair.row as usize, &neighbor);
-        let fired = fired(self.rules, (self.targets, found.row, &target), of_neighbor);
+        let fired = if self.rules.surfaces() > 1 {
+            list::fired(self.rules, (self.targets, found.row), neighbors, pair)?
+        } else {
+            let target = self.targets.node(self.pixel(found), found.row);
+            let neighbor = neighbors.node(pair.pixel, pair.row as usize);
+            let of_neighbor = (neighbors, pair.row as usize, &neighbor);
+            fired(self.rules, (self.targets, found.row, &target), of_neighbor)
+        };
+        if let Some(hidden) = self.rules.hidden().filter(|_| found.hidden) {
+            return Some(Drawn { color: Vec3::from(hidden.color), alpha: hidden.alpha, fired });
+        }
         let kind = LineType::of(fired);
         let changed = self.rules.types().map_or_else(TypeStyle::default, |types| types.style(kind));
         Some(Drawn {
-            color: changed.color.unwrap_or_else(|| Vec3::from(nodes.nodes.line_color.get(row))),
-            alpha: nodes.alpha(row, kind, self.rules),
+            color: changed.color.unwrap_or_else(|| Vec3::from(nodes.line_color.get(row))),
+            alpha: alpha(nodes, row, kind, self.rules),
             fired,
         })
     }
@@ -120,11 +131,11 @@ impl Styler<'_, '_> {
         gate: &mut Vec<GateCounts>,
     ) {
         let mut batches: BTreeMap<u32, (PairBatch, Vec<(usize, usize)>)> = BTreeMap::new();
-        for (index, found) in found.iter().enumerate() {
+        for (index, found) in found.iter().enumerate().filter(|(_, found)| !found.hidden) {
             for (layer, pair) in std::iter::once(&found.pair).chain(&found.behind).enumerate() {
                 let (Some(sides), Some(drawn)) = (self.sides(found, pair), drawn[index].get(layer)) else { continue };
                 let [(nodes, row), _] = sides;
-                let shader = nodes.nodes.shader.get(row);
+                let shader = nodes.shader.get(row);
                 if self.rules.is_scripted(shader) {
                     let (batch, places) = batches.entry(shader).or_default();
                     self.add(batch, found, pair, sides, drawn);
@@ -148,34 +159,24 @@ impl Styler<'_, '_> {
     }
 
     /// Adds a line to what a script is asked about.
-    fn add(
-        &self,
-        batch: &mut PairBatch,
-        found: &Found,
-        pair: &Pair,
-        sides: [(&PathTile<'_>, usize); 2],
-        drawn: &Drawn,
-    ) {
+    fn add(&self, batch: &mut PairBatch, found: &Found, pair: &Pair, sides: [(&NodeColumns, usize); 2], drawn: &Drawn) {
         let [(nodes, row), _] = sides;
         // There is no pair without a reason.
         let kind = LineType::of(drawn.fired).unwrap_or(LineType::Feature);
-        let asked_squared = nodes.bounds.radius_squared.get(row);
-        let types = self.rules.types();
-        let radius_squared = types.map_or(asked_squared, |types| types.radius_squared(kind, asked_squared));
-        let width = types.and_then(|types| types.style(Some(kind)).width);
+        let changed = self.rules.types().and_then(|types| types.style(Some(kind)).width);
+        let width = changed.unwrap_or_else(|| nodes.line_width.get(row));
         let [x, y] = self.pixel(found);
         let [across, down] = self.targets.offset(found.row);
         batch.len += 1;
         batch.kind.push(kind);
         batch.path.push(found.path);
-        batch.distance.push((pair.distance_squared / radius_squared).sqrt().min(1.0));
+        batch.distance.push((pair.distance_squared.sqrt() / self.rules.radius(width)).min(1.0));
         batch.own.push(pair.own);
-        batch.width.push(width.unwrap_or_else(|| nodes.nodes.line_width.get(row)));
+        batch.width.push(width);
         batch.color.push(drawn.color.to_array());
         batch.opacity.push(drawn.alpha);
         batch.pixel.push([x as f32 + across, y as f32 + down]);
         for (side, (nodes, row)) in batch.sides.iter_mut().zip(sides) {
-            let nodes = nodes.nodes;
             side.object.push(nodes.object_itself(row));
             side.material.push(nodes.shader.get(row));
             side.depth.push(nodes.depth.get(row).min(PairSide::FARTHEST));
@@ -219,6 +220,7 @@ impl Styler<'_, '_> {
             alpha: covered,
             lined: lined.to_array(),
             path: found.path,
+            hidden: found.hidden,
             fired: drawn.first()?.fired,
             neighbor: (pair.pixel, neighbors.nodes.rows.sample(pair.row as usize) % neighbors.buffer.samples_per_pixel),
             own: pair.own,

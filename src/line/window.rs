@@ -143,11 +143,12 @@ impl<'a> PathTile<'a> {
         Rank::new(self.nodes.priority.get(row), self.nodes.depth.get(row))
     }
 
-    /// How much the line of a row covers, 0 … 1, if it is of a type that may change it.
-    pub(super) fn alpha(&self, row: usize, kind: Option<LineType>, rules: &Rules) -> f32 {
-        let changed = rules.types().map_or_else(TypeStyle::default, |types| types.style(kind));
-        let width = changed.width.unwrap_or_else(|| self.nodes.line_width.get(row));
-        rules.alpha(width) * self.nodes.line_opacity.get(row) * changed.opacity.unwrap_or(1.0)
+    /// Where the surface at a place of a row's list is kept: its columns and its row there.
+    pub(super) fn surface(&self, row: usize, place: u32) -> Option<(&'a NodeColumns, usize)> {
+        let Some(behind) = (place as usize).checked_sub(1) else { return Some((self.nodes, row)) };
+        let behind = self.nodes.behind.get(behind)?;
+        let sample = self.nodes.rows.sample(row);
+        Some((behind, behind.row_in_pixel((sample / self.buffer.samples_per_pixel) as usize, sample)?))
     }
 
     #[inline(always)]
@@ -175,6 +176,13 @@ impl LineStyle {
     pub(super) fn is_opaque(&self, rules: &Rules) -> bool {
         rules.alpha(self.width) * self.opacity >= 1.0 && !self.scripted
     }
+}
+
+/// How much the line of a row covers, 0 … 1, if it is of a type that may change it.
+pub(super) fn alpha(nodes: &NodeColumns, row: usize, kind: Option<LineType>, rules: &Rules) -> f32 {
+    let changed = rules.types().map_or_else(TypeStyle::default, |types| types.style(kind));
+    let width = changed.width.unwrap_or_else(|| nodes.line_width.get(row));
+    rules.alpha(width) * nodes.line_opacity.get(row) * changed.opacity.unwrap_or(1.0)
 }
 
 /// The style of a row.

@@ -173,6 +173,7 @@ struct Totals {
     seconds: Seconds,
     rays: RayCounts,
     lines: LineCounts,
+    surfaces_behind: u64,
     samples: u64,
     bytes: u64,
     hits: Vec<u64>,
@@ -348,6 +349,7 @@ impl<'a> Render<'a> {
                 totals.seconds.shade += shading;
                 totals.rays += rays;
                 totals.samples += samples.color.len() as u64;
+                totals.surfaces_behind += samples.surfaces_behind() as u64;
                 totals.bytes += (samples.bytes() + bounds.as_ref().map_or(0, TileBounds::bytes)) as u64;
                 totals.hits.iter_mut().zip(&hits).for_each(|(total, hits)| *total += hits);
                 totals.shade_seconds.iter_mut().zip(&shade_seconds).for_each(|(total, seconds)| *total += seconds);
@@ -393,7 +395,7 @@ impl<'a> Render<'a> {
                 rays: totals.rays.into(),
                 samples: totals.samples,
                 bytes_per_sample: totals.bytes as f64 / (totals.samples as f64).max(1.0),
-                lines: Lines::new(totals.lines, gate),
+                lines: Lines::new(totals.lines, totals.surfaces_behind, gate),
                 gate: gate.into(),
                 peak_rss_bytes: stats::peak_memory(),
                 triangles: self.scene.triangle_count(),

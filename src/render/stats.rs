@@ -76,15 +76,21 @@ pub struct Lines {
     pub pairs_tested: u64,
     /// Samples that see a line.
     pub lined_samples: u64,
+    /// Of those, samples that see the line of a hidden surface.
+    pub hidden_samples: u64,
+    /// Surfaces that were kept behind the first ones of rays.
+    pub surfaces_behind: u64,
     /// Nodes whose line width was clamped to `max_width`.
     pub clamped_widths: u64,
 }
 
 impl Lines {
-    pub(super) fn new(counts: LineCounts, gate: GateCounts) -> Self {
+    pub(super) fn new(counts: LineCounts, surfaces_behind: u64, gate: GateCounts) -> Self {
         Self {
             pairs_tested: counts.pairs_tested,
             lined_samples: counts.lined_samples,
+            hidden_samples: counts.hidden_samples,
+            surfaces_behind,
             clamped_widths: gate.clamped_widths,
         }
     }

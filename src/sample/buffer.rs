@@ -339,6 +339,10 @@ pub struct NodeColumns {
     pub throughput: Column<[f32; 3]>,
     /// Subtree contributions.
     pub contribution: Column<[f32; 3]>,
+    /// The surfaces behind these on the same rays (DESIGN section 3.4): first the second surface of each sample that has
+    /// one, then the third, and so on. Empty unless the plan asks for them. A sample with a surface here has one in all
+    /// before. Never misses; throughput and contribution are those of the first surface's row and stay neutral here.
+    pub behind: Vec<NodeColumns>,
 }
 
 /// All samples of a rectangle of pixels.
@@ -403,6 +407,20 @@ impl NodeColumns {
             + self.footprint.bytes()
             + self.throughput.bytes()
             + self.contribution.bytes()
+            + self.behind.iter().map(|behind| size_of::<Self>() + behind.bytes()).sum::<usize>()
+    }
+
+    /// The row of a sample in a pixel (by its number in the rectangle), if it has one.
+    #[inline]
+    #[must_use]
+    pub fn row_in_pixel(&self, pixel: usize, sample: u32) -> Option<usize> {
+        match &self.rows {
+            Rows::Every { .. } => Some(sample as usize),
+            Rows::Some { first, sample: samples } => {
+                let (start, end) = (first[pixel] as usize, first[pixel + 1] as usize);
+                samples[start..end].binary_search(&sample).ok().map(|place| start + place)
+            }
+        }
     }
 }
 
@@ -425,6 +443,12 @@ impl SampleBuffer {
     pub fn pixel_of(&self, sample: u32) -> [i32; 2] {
         let (pixel, width) = (sample / self.samples_per_pixel, self.rect.width());
         [self.rect.x0 + (pixel % width) as i32, self.rect.y0 + (pixel / width) as i32]
+    }
+
+    /// Number of surfaces behind the first ones, over all lists.
+    #[must_use]
+    pub fn surfaces_behind(&self) -> usize {
+        self.paths.iter().flat_map(|nodes| &nodes.behind).map(|behind| behind.rows.len()).sum()
     }
 
     /// The nodes at a path, if any sample has one there.

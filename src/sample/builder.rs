@@ -49,6 +49,8 @@ pub struct SampleBufferBuilder {
     paths: Vec<PathRows>,
     /// Where in `paths` the last node went: waves come path by path.
     last: usize,
+    /// Surfaces behind those of `paths`, each with its place in the lists of its path, from 1.
+    behind: Vec<(PathRows, usize)>,
     gate: GateLog,
     /// Faults of extra outputs; who made them is known when the camera's nodes are complete.
     extra_faults: Vec<(u32, Faults)>,
@@ -69,6 +71,7 @@ impl SampleBufferBuilder {
             aovs: vec![kept(true); layout.aovs],
             paths: vec![PathRows::new(NodePath::CAMERA, samples)],
             last: 0,
+            behind: Vec::new(),
             gate: GateLog::default(),
             extra_faults: Vec::new(),
             layout: layout.clone(),
@@ -107,6 +110,29 @@ impl SampleBufferBuilder {
         }
     }
 
+    /// Adds a surface behind the node of a path on the same ray: `surface` 1 is the second of the ray's list. The gate checks
+    /// it as any node. A miss is no surface; one without a surface before it in the list is dropped when the buffer is
+    /// closed.
+    ///
+    /// # Panics
+    /// If the rectangle has no such sample, or `surface` is 0.
+    pub fn push_behind(&mut self, path: NodePath, surface: usize, sample: u32, node: Node) {
+        assert!((sample as usize) < self.offset.len(), "sample {sample} lies outside the buffer");
+        assert!(surface > 0, "the first surface is the node itself");
+        if node.object == 0 {
+            return;
+        }
+        let kept = NodeColumnSet { member: false, throughput: false, contribution: false, ..self.layout.columns };
+        let (node, faults) = clean_node(node, kept, self.layout.max_width_of(node.shader));
+        self.gate.note(path, sample, node.shader, faults);
+        let place = self.behind.iter().position(|(rows, of)| *of == surface && rows.path == path);
+        let place = place.unwrap_or_else(|| {
+            self.behind.push((PathRows::new(path, 0), surface));
+            self.behind.len() - 1
+        });
+        self.behind[place].0.push(sample, &node, kept);
+    }
+
     /// Adds a node; of several at one path of one sample the first stays. Columns that the layout does not keep are
     /// dropped here; the gate checks the others.
     pub fn push(&mut self, path: NodePath, sample: u32, node: Node) {
@@ -127,8 +153,24 @@ impl SampleBufferBuilder {
     pub fn finish(mut self) -> SampleBuffer {
         self.add_missing_camera_nodes();
         self.paths.sort_by_key(|rows| rows.path);
-        let paths: Vec<_> =
-            self.paths.into_iter().map(|rows| rows.finish(&self.rect, self.layout.samples_per_pixel)).collect();
+        let per_pixel = self.layout.samples_per_pixel;
+        let mut paths: Vec<_> =
+            self.paths.into_iter().map(|rows| rows.finish(&self.rect, per_pixel, |_| true)).collect();
+        self.behind.sort_by_key(|(rows, surface)| (rows.path, *surface));
+        for (rows, surface) in self.behind {
+            let Ok(front) = paths.binary_search_by_key(&rows.path, |nodes| nodes.path) else { continue };
+            let front = &mut paths[front];
+            if front.behind.len() + 1 == surface {
+                let before = front.behind.last().unwrap_or(front);
+                let behind = rows.finish(&self.rect, per_pixel, |sample| {
+                    let row = before.row_in_pixel((sample / per_pixel) as usize, sample);
+                    row.is_some_and(|row| before.object.get(row) != 0)
+                });
+                if !behind.rows.is_empty() {
+                    front.behind.push(behind);
+                }
+            }
+        }
         for (sample, faults) in self.extra_faults {
             self.gate.note(NodePath::CAMERA, sample, paths[0].shader.get(sample as usize), faults);
         }
@@ -256,9 +298,12 @@ impl PathRows {
         }
     }
 
-    fn finish(self, rect: &PixelRect, samples_per_pixel: u32) -> NodeColumns {
-        let order = (!self.rising).then(|| {
-            let mut order: Vec<u32> = (0..).take(self.sample.len()).collect();
+    /// The columns of the samples to be kept.
+    fn finish(self, rect: &PixelRect, samples_per_pixel: u32, keep: impl Fn(u32) -> bool) -> NodeColumns {
+        let all_kept = self.sample.iter().all(|&sample| keep(sample));
+        let order = (!self.rising || !all_kept).then(|| {
+            let rows = (0..).zip(&self.sample);
+            let mut order: Vec<u32> = rows.filter_map(|(row, &sample)| keep(sample).then_some(row)).collect();
             order.sort_by_key(|&row| self.sample[row as usize]);
             order.dedup_by_key(|row| self.sample[*row as usize]);
             order
@@ -300,6 +345,7 @@ impl PathRows {
             footprint: self.footprint.ordered(order),
             throughput: self.throughput.ordered(order),
             contribution: self.contribution.ordered(order),
+            behind: Vec::new(),
         }
     }
 }
@@ -394,6 +440,8 @@ pub struct HandMadeSample<'a> {
     pub color: SampleColor,
     /// Its nodes, at most one per path.
     pub nodes: &'a [(NodePath, Node)],
+    /// The surfaces behind them, for each path front to back.
+    pub behind: &'a [(NodePath, Node)],
 }
 
 impl SampleBuffer {
@@ -408,6 +456,10 @@ impl SampleBuffer {
             builder.set_sample(index, sample.offset, sample.color, shader);
             for &(path, node) in sample.nodes {
                 builder.push(path, index, node);
+            }
+            for (place, &(path, node)) in sample.behind.iter().enumerate() {
+                let before = sample.behind[..place].iter().filter(|(other, _)| *other == path).count();
+                builder.push_behind(path, before + 1, index, node);
             }
         }
         builder.finish()

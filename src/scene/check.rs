@@ -1,6 +1,7 @@
 //! What must hold between the parts of a scene, whoever built it.
 
 use super::SceneBuilder;
+use super::ids::ObjectId;
 use super::light::LightKind;
 use super::mesh::Mesh;
 use crate::diag::{Diagnostic, Diagnostics, Span};
@@ -13,6 +14,8 @@ pub(super) const MAX_PIXELS: u64 = 1 << 32;
 pub(super) const MAX_SAMPLES: u32 = 1 << 14;
 /// The widest line, in pixels.
 pub(super) const MAX_LINE_WIDTH: f32 = 1024.0;
+/// The longest surface list.
+pub(super) const MAX_SURFACES: u32 = 16;
 
 pub(super) fn check(scene: &SceneBuilder, faults: &mut Diagnostics) {
     check_settings(scene, faults);
@@ -92,6 +95,19 @@ fn check_settings(scene: &SceneBuilder, faults: &mut Diagnostics) {
         require((0.0..=MAX_LINE_WIDTH).contains(&width), format!("line {name} must be 0 to {MAX_LINE_WIDTH} pixels"));
     }
     require(lines.color.is_finite(), "the line colour must be finite".into());
+    require((1..=MAX_SURFACES).contains(&lines.surfaces), format!("surfaces must be 1 to {MAX_SURFACES}"));
+    if let Some(hidden) = &lines.hidden {
+        require(
+            (0.0..=MAX_LINE_WIDTH).contains(&hidden.width),
+            format!("the width of hidden lines must be 0 to {MAX_LINE_WIDTH} pixels"),
+        );
+        require(hidden.color.is_finite(), "the colour of hidden lines must be finite".into());
+        require(lines.surfaces > 1, "hidden lines need 2 surfaces or more".into());
+        let missing = |id: &&ObjectId| id.index() >= scene.objects.len();
+        if let Some(id) = hidden.objects.iter().flatten().find(missing) {
+            require(false, format!("hidden lines are asked of {id}, which is not there"));
+        }
+    }
     let overridden = scene.materials.iter().map(|material| {
         let settings = material.lines.over(lines);
         (format!(" of material `{}`", material.name), settings)

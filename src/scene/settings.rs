@@ -2,7 +2,7 @@
 
 use bitflags::bitflags;
 
-use super::ids::TextureId;
+use super::ids::{ObjectId, TextureId};
 use crate::math::Vec3;
 
 /// A reconstruction filter's shape; its radius stands beside it.
@@ -191,6 +191,21 @@ pub struct LineSettings {
     pub compose: Composition,
     /// What each type changes, in the order of [`LineType::ALL`].
     pub types: [TypeStyle; LineType::ALL.len()],
+    /// How many surfaces a ray's list holds at most (DESIGN section 3.4), at least 1.
+    pub surfaces: u32,
+    /// How lines of surfaces behind the first are drawn; `None` if they are not. Needs `surfaces` above 1.
+    pub hidden: Option<HiddenLines>,
+}
+
+/// `[lines.hidden]`: one style for all lines of surfaces behind the first.
+#[derive(Clone, Debug, PartialEq)]
+pub struct HiddenLines {
+    /// Linear.
+    pub color: Vec3,
+    /// Full width in pixels; 0 is no line.
+    pub width: f32,
+    /// The objects whose hidden lines are drawn, each with its group; `None` for all.
+    pub objects: Option<Vec<ObjectId>>,
 }
 
 impl Default for LineSettings {
@@ -212,20 +227,23 @@ impl Default for LineSettings {
             tint: true,
             compose: Composition::Replace,
             types: [TypeStyle::default(); LineType::ALL.len()],
+            surfaces: 1,
+            hidden: None,
         }
     }
 }
 
 impl LineSettings {
+    /// Whether a test is on that reads more than objects and materials.
+    #[must_use]
+    pub fn tests_shapes(&self) -> bool {
+        self.uv.is_some() || self.normal.is_some() || self.feature.is_some() || self.overlap.is_some()
+    }
+
     /// Whether any test is on.
     #[must_use]
     pub fn tests_anything(&self) -> bool {
-        self.object
-            || self.shader
-            || self.uv.is_some()
-            || self.normal.is_some()
-            || self.feature.is_some()
-            || self.overlap.is_some()
+        self.object || self.shader || self.tests_shapes()
     }
 }
 

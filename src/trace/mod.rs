@@ -5,12 +5,13 @@
 //! - [`world`]: one hierarchy over the objects; closest hits and shadow rays.
 //! - [`surface`]: from a hit to a place with normals, texture coordinates and error bounds.
 //! - [`wave`]: the rays of a tile, one depth of the ray tree at a time; `shadow` finds what lights give a hit, `scatter`
-//!   shades hits and sends rays on.
+//!   shades hits and sends rays on; `list` keeps what the line pass wants to know of surfaces behind the first.
 //!
 //! Everything here works relative to the camera's position, so that precision is best where the camera looks from,
 //! wherever in the world that is.
 
 mod cone;
+mod list;
 mod ray_tree;
 mod scatter;
 mod shadow;

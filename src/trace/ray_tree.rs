@@ -81,6 +81,8 @@ pub(super) struct WaveHit {
     pub material: MaterialId,
     /// Path length from the camera.
     pub depth: f32,
+    /// Its place in the surface list of its ray: 0 for the first, which makes the picture; only the line pass sees others.
+    pub place: u32,
 }
 
 /// A run of samples: their trees so far, and the rays that are still to be traced.
@@ -92,6 +94,10 @@ pub(super) struct Run {
     pub again: Vec<WaveRay>,
     /// The next wave.
     pub next: Vec<WaveRay>,
+    /// Hits behind the first ones of this wave.
+    pub behind: Vec<WaveHit>,
+    /// What the line pass will see of surfaces behind the first: the node, the place in its list, and the attributes.
+    pub surfaces: Vec<(u32, u32, Node)>,
     /// World position at each camera node, if the plan keeps them.
     pub positions: Vec<Vec3>,
     /// Extra outputs at each camera node, `aov_count` each.
@@ -101,10 +107,12 @@ pub(super) struct Run {
 impl Run {
     /// Empties the run and keeps its memory.
     pub fn clear(&mut self) {
-        let Self { nodes, again, next, positions, aovs } = self;
+        let Self { nodes, again, next, behind, surfaces, positions, aovs } = self;
         nodes.clear();
         again.clear();
         next.clear();
+        behind.clear();
+        surfaces.clear();
         positions.clear();
         aovs.clear();
     }

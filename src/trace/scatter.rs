@@ -13,7 +13,7 @@ use crate::scene::ids::MaterialId;
 use crate::shade::analysis::inputs::LIMIT;
 use crate::shade::batch::{HitBatch, LightSample, OutputBatch};
 use crate::shade::bsdf::{Bounces, unit};
-use crate::shade::{Bsdf, InputSet, Mode, PathKind};
+use crate::shade::{Bsdf, InputSet, Mode, OutputSet, PathKind};
 
 /// A branch of the ray tree that weighs less than this in every channel is not traced: what it shows would have to be
 /// brighter than white to change an 8-bit picture by one step. Like a branch beyond the depth limits, it counts as black.
@@ -21,9 +21,9 @@ const LEAST_THROUGHPUT: f32 = 1.0 / 512.0;
 
 /// The outputs of a material's shader at one hit: a batch and a row in it.
 #[derive(Clone, Copy)]
-struct Outputs<'a> {
-    batch: &'a OutputBatch,
-    row: usize,
+pub(super) struct Outputs<'a> {
+    pub batch: &'a OutputBatch,
+    pub row: usize,
 }
 
 impl TileTracer<'_> {
@@ -45,7 +45,7 @@ impl TileTracer<'_> {
         if constant {
             self.evaluate_once(material, context);
         } else {
-            self.evaluate(material, group, run, &lights, context);
+            self.evaluate(material, group, run, &lights, (plan.wanted | self.marker, plan.inputs), context);
         }
         work.hits[material.index()] += group.len() as u64;
         work.shade_seconds[material.index()] += clock.seconds();
@@ -62,7 +62,7 @@ impl TileTracer<'_> {
     }
 
     /// Runs the shader of a constant material, once per context.
-    fn evaluate_once(&self, material: MaterialId, context: &mut TraceContext<'_>) {
+    pub(super) fn evaluate_once(&self, material: MaterialId, context: &mut TraceContext<'_>) {
         let TraceContext { shading, hits, errors, constants, .. } = context;
         let constant = &mut constants[material.index()];
         if constant.is_none() {
@@ -76,28 +76,28 @@ impl TileTracer<'_> {
     }
 
     /// Runs a material's shader over a group of hits, into the context's outputs.
-    fn evaluate(
+    pub(super) fn evaluate(
         &self,
         material: MaterialId,
         group: &[WaveHit],
         run: &Run,
         lights: &[LightSample],
+        (wanted, inputs): (OutputSet, InputSet),
         context: &mut TraceContext<'_>,
     ) {
-        let plan = &self.plan.materials[material.index()];
         let TraceContext { shading, hits, outputs, errors, .. } = context;
         hits.clear();
         hits.material_id = material.0 + 1;
         hits.time = self.scene.time();
         hits.light_count = self.lighting.len();
-        if plan.inputs.intersects(InputSet::LIGHTS) {
+        if inputs.intersects(InputSet::LIGHTS) {
             hits.lights.extend_from_slice(lights);
         }
         for hit in group {
             let node = &run.nodes[hit.ray.node as usize];
-            self.gather(hits, plan.inputs, hit, node.kind, node.cone);
+            self.gather(hits, inputs, hit, node.kind, node.cone);
         }
-        shading.shade(material, hits, plan.wanted | self.marker, outputs, errors);
+        shading.shade(material, hits, wanted, outputs, errors);
     }
 
     /// Adds one hit to a batch: only the columns that are read.
@@ -256,7 +256,7 @@ impl TileTracer<'_> {
         }
     }
 
-    fn attributes(&self, hit: &WaveHit, cone: Cone, Outputs { batch, row }: Outputs<'_>) -> Node {
+    pub(super) fn attributes(&self, hit: &WaveHit, cone: Cone, Outputs { batch, row }: Outputs<'_>) -> Node {
         let object = &self.scene.objects()[hit.hit.object.index()];
         let placed = self.world.object(hit.hit.object);
         let lines = self.scene.lines();

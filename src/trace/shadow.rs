@@ -72,7 +72,7 @@ impl TileTracer<'_> {
                     WaveRay { origin: ray.origin, direction: ray.direction, node: 0, after: None, passed: 0 };
                 let surface = Surface::new(self.world, ray, hit);
                 let material = self.world.material(hit);
-                (*sample, WaveHit { ray: wave_ray, hit: *hit, surface, material, depth: hit.t })
+                (*sample, WaveHit { ray: wave_ray, hit: *hit, surface, material, depth: hit.t, place: 0 })
             })
             .collect();
         hits.sort_by_key(|(_, hit)| hit.material);

@@ -12,7 +12,7 @@ use super::cone::Cone;
 use super::ray_tree::{Run, TreeNode, WaveHit, WaveRay};
 use super::surface::Surface;
 use super::triangle::Ray;
-use super::world::World;
+use super::world::{Hit, World};
 use crate::clock::CpuClock;
 use crate::math::Vec3;
 use crate::plan::{Plan, marker};
@@ -29,7 +29,7 @@ const RUN_SAMPLES: usize = 4096;
 /// The same where rays branch, so that even deep trees of mirrors and glass stay small in memory.
 const RUN_SAMPLES_BRANCHING: usize = 1024;
 /// Most surfaces of opacity 0 that a ray passes before it is taken to leave the scene.
-const MOST_INVISIBLE: u32 = 256;
+pub(super) const MOST_INVISIBLE: u32 = 256;
 
 /// Rays traced, by kind, for `--stats`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -184,6 +184,7 @@ impl<'a> TileTracer<'a> {
             self.run_wave(wave, &mut run, context, work);
         }
         run.gather_radiance();
+        run.surfaces.sort_by_key(|&(node, place, _)| (place, node));
         self.store(&run, &offsets, samples);
         context.run = run;
     }
@@ -222,45 +223,34 @@ impl<'a> TileTracer<'a> {
             for group in hits.chunk_by(|a, b| a.material == b.material) {
                 self.shade_group(group, run, context, work);
             }
+            run.forget_behind_again();
             std::mem::swap(&mut wave, &mut run.again);
+        }
+        if !run.behind.is_empty() {
+            self.shade_behind(run, context, work);
         }
     }
 
     fn find_hits(&self, wave: &[WaveRay], run: &mut Run, work: &mut Work) -> Vec<WaveHit> {
         let mut hits = Vec::with_capacity(wave.len());
+        let mut list = Vec::new();
         for wave_ray in wave {
-            let node = &mut run.nodes[wave_ray.node as usize];
-            let kind = match node.kind {
-                PathKind::Camera | PathKind::Shadow => {
-                    work.rays.camera += 1;
-                    RayKinds::CAMERA
-                }
-                PathKind::Reflection => {
-                    work.rays.reflection += 1;
-                    RayKinds::REFLECTION
-                }
-                PathKind::Refraction => {
-                    work.rays.refraction += 1;
-                    RayKinds::REFRACTION
-                }
-            };
+            let Run { nodes, behind, .. } = run;
+            let node = &mut nodes[wave_ray.node as usize];
+            let kind = work.count(node.kind);
             let ray = Ray::new(wave_ray.origin, wave_ray.direction);
-            let found = if wave_ray.passed < MOST_INVISIBLE {
-                self.world.next_hit(&ray, kind, f32::INFINITY, wave_ray.after)
-            } else {
+            let found = if wave_ray.passed >= MOST_INVISIBLE {
                 None
+            } else if self.keeps_list(node.path) {
+                self.surface_list(&ray, kind, wave_ray, &[], &mut list);
+                let hits = list.iter().enumerate().skip(1);
+                behind.extend(hits.map(|(place, hit)| self.wave_hit(wave_ray, &ray, hit, node, place)));
+                list.first().copied()
+            } else {
+                self.world.next_hit(&ray, kind, f32::INFINITY, wave_ray.after)
             };
             match found {
-                Some(hit) => {
-                    let surface = Surface::new(self.world, &ray, &hit);
-                    hits.push(WaveHit {
-                        ray: *wave_ray,
-                        hit,
-                        surface,
-                        material: self.world.material(&hit),
-                        depth: node.length_before + hit.t,
-                    });
-                }
+                Some(hit) => hits.push(self.wave_hit(wave_ray, &ray, &hit, node, 0)),
                 None => {
                     node.radiance = self.lighting.background(wave_ray.direction);
                     node.alpha = if self.transparent { 0.0 } else { 1.0 };
@@ -268,6 +258,19 @@ impl<'a> TileTracer<'a> {
             }
         }
         hits
+    }
+
+    /// A hit on its way to be shaded.
+    #[inline]
+    pub(super) fn wave_hit(&self, from: &WaveRay, ray: &Ray, hit: &Hit, node: &TreeNode, place: usize) -> WaveHit {
+        WaveHit {
+            ray: *from,
+            hit: *hit,
+            surface: Surface::new(self.world, ray, hit),
+            material: self.world.material(hit),
+            depth: node.length_before + hit.t,
+            place: place as u32,
+        }
     }
 
     /// Hands the nodes of a run to the sample buffer.
@@ -292,6 +295,10 @@ impl<'a> TileTracer<'a> {
             attributes.contribution = (Vec3::from(attributes.throughput) * node.radiance).to_array();
             samples.push(node.path, node.sample, attributes);
         }
+        for &(node, place, attributes) in &run.surfaces {
+            let node = &run.nodes[node as usize];
+            samples.push_behind(node.path, place as usize, node.sample, attributes);
+        }
     }
 }
 
@@ -300,6 +307,19 @@ pub(super) struct Work {
     pub rays: RayCounts,
     pub hits: Vec<u64>,
     pub shade_seconds: Vec<f64>,
+}
+
+impl Work {
+    /// Counts a ray towards a node; returns what objects see it as.
+    pub fn count(&mut self, kind: PathKind) -> RayKinds {
+        let (count, kind) = match kind {
+            PathKind::Camera | PathKind::Shadow => (&mut self.rays.camera, RayKinds::CAMERA),
+            PathKind::Reflection => (&mut self.rays.reflection, RayKinds::REFLECTION),
+            PathKind::Refraction => (&mut self.rays.refraction, RayKinds::REFRACTION),
+        };
+        *count += 1;
+        kind
+    }
 }
 
 /// A row of an output column; the default where the column is absent.

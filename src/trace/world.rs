@@ -165,6 +165,47 @@ impl World {
         best
     }
 
+    /// The first hits of a ray of one kind, front to back, in one traversal: at most `most`, of those that are `same` (an
+    /// equivalence) only the first, none up to the one of rank `after`, and none that is `absent`. The first of
+    /// them is that of [`Self::next_hit`], bit for bit.
+    ///
+    /// Instead of looking for one hit after the other (Wald et al. 2018), the nearest are kept sorted while the hierarchy is
+    /// traversed once, and the last of them is the far end of the ray: no hit is lost or doubled at equal depth, since
+    /// ranks settle all ties, and nothing is traversed twice.
+    pub fn first_hits(
+        &self,
+        ray: &Ray,
+        kind: RayKinds,
+        (after, absent): (Option<HitRank>, &[HitRank]),
+        most: usize,
+        same: impl Fn(&Hit, &Hit) -> bool,
+        hits: &mut Vec<Hit>,
+    ) {
+        hits.clear();
+        self.each_hit(ray, kind, f32::INFINITY, |hit, t_max| {
+            let rank = hit.rank();
+            if after.is_some_and(|after| rank <= after) || absent.contains(&rank) {
+                return true;
+            }
+            match hits.iter().position(|known| same(known, &hit)) {
+                Some(known) if rank < hits[known].rank() => {
+                    hits.remove(known);
+                }
+                Some(_) => return true,
+                None => {}
+            }
+            let place = hits.partition_point(|known| known.rank() < rank);
+            if place < most {
+                hits.truncate(most - 1);
+                hits.insert(place, hit);
+                if hits.len() == most {
+                    *t_max = hits[most - 1].t;
+                }
+            }
+            true
+        });
+    }
+
     /// Looks for something that blocks a shadow ray within `t_max`. `opaque` tells of a material whether it surely
     /// blocks; hits on others are collected in `passed`, nearest first. Returns whether the ray is surely blocked
     /// (`passed` is then incomplete).

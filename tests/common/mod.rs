@@ -30,6 +30,24 @@ pub fn load(text: &str) -> Result<Scene, Diagnostics> {
     builder.build()
 }
 
+/// A scene with materials: their names, and the text of their `surface(hit, p)`.
+pub fn scripted_scene(text: &str, shaders: &[(&str, &str)]) -> Scene {
+    let folder = root().join("scenes");
+    // Without the key a scene gets lights by default.
+    let dark = if text.contains("[[lights]]") { "" } else { "lights = []\n" };
+    let mut text = format!("{dark}{text}");
+    let mut files = FileStore::new();
+    for (name, body) in shaders {
+        text += &format!("\n[materials.{name}]\nshader = \"{name}.rhai\"\n");
+        files = files.with_file(folder.join(format!("{name}.rhai")), format!("fn surface(hit, p) {{ {body} }}"));
+    }
+    let path = folder.join("light_test.toml");
+    let files = files.with_file(&path, text.as_str());
+    file::load(&path, &files, &[], &file::LoadOptions::default())
+        .and_then(|(builder, _)| builder.build())
+        .unwrap_or_else(|faults| panic!("the scene is at fault:\n{faults}\n\n{text}"))
+}
+
 /// A picture in memory.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picture {

@@ -108,10 +108,15 @@ fn a_constant_picture_stays_constant() {
     }
 }
 
-/// What a compositor does with half floats: the lines over what lies below them are the picture with lines, and the lines
-/// by type and by path add up to the lines.
+/// What a compositor does with half floats: the lines over the hidden ones over what lies below are the picture with lines,
+/// and the lines by type and by path add up to the lines. Without hidden lines, too.
 #[test]
 fn layers_rebuild_the_picture() {
+    rebuild(|_, _| false);
+    rebuild(|x, s| (x as u32 + s).is_multiple_of(3));
+}
+
+fn rebuild(hidden: fn(i32, u32) -> bool) {
     let random = Samples::noise([11, 9], 5);
     let samples = Samples {
         line: |x, y, s| {
@@ -125,23 +130,31 @@ fn layers_rebuild_the_picture() {
         },
         ..random
     };
+    let mut tiles = samples.tiles(64);
+    for line in tiles.iter_mut().flat_map(|(_, lines)| lines.samples.iter().zip(&mut lines.lines)) {
+        let (sample, line) = line;
+        line.hidden = hidden((sample / 5 % 11) as i32, sample % 5);
+    }
     let half = |x: f32| half::f16::from_f32(x).to_f32();
     let types = Layer::FIXED.into_iter().filter(|layer| matches!(layer, Layer::LineType(_)));
     let paths = [LinePath::Camera, LinePath::Reflection, LinePath::Refraction].map(Layer::LinePath);
-    let layers: Vec<_> = [Layer::Rgba, Layer::Line, Layer::Below].into_iter().chain(types).chain(paths).collect();
+    let layers: Vec<_> =
+        [Layer::Rgba, Layer::Line, Layer::Below, Layer::HiddenLine].into_iter().chain(types).chain(paths).collect();
     for kind in [FilterKind::Box, FilterKind::Tent, FilterKind::Gaussian, FilterKind::BlackmanHarris] {
-        let tile = whole(&samples, &Filter::new(kind, 1.5), &layers);
+        let rect = PixelRect::of_size(samples.size);
+        let tile = develop(&window(&tiles, samples.size, 64), rect, &Filter::new(kind, 1.5), &layers);
         let value = |layer: usize, channel: usize, i: usize| tile.channels[4 * layer + channel][i];
         for i in 0..tile.rect.pixels() {
             for channel in 0..4 {
-                let [rgba, line, below] = [0, 1, 2].map(|layer| half(value(layer, channel, i)));
-                let over = line + (1.0 - half(value(1, 3, i))) * below;
-                // Half floats have 11 bits; three of them are rounded here.
-                let tolerance = 3.0 / 2048.0 * rgba.abs().max(below.abs()).max(1.0);
+                let [rgba, line, below, hidden] = [0, 1, 2, 3].map(|layer| half(value(layer, channel, i)));
+                let under = hidden + (1.0 - half(value(3, 3, i))) * below;
+                let over = line + (1.0 - half(value(1, 3, i))) * under;
+                // Half floats have 11 bits; five of them are rounded here.
+                let tolerance = 5.0 / 2048.0 * rgba.abs().max(below.abs()).max(1.0);
                 assert!((over - rgba).abs() < tolerance, "{kind:?}, pixel {i}, channel {channel}: {over}, not {rgba}");
                 let sum = |layers: std::ops::Range<usize>| layers.map(|layer| value(layer, channel, i)).sum::<f32>();
-                assert!((sum(3..9) - value(1, channel, i)).abs() < 1e-5, "types, pixel {i}");
-                assert!((sum(9..12) - value(1, channel, i)).abs() < 1e-5, "paths, pixel {i}");
+                assert!((sum(4..10) - value(1, channel, i)).abs() < 1e-5, "types, pixel {i}");
+                assert!((sum(10..13) - value(1, channel, i)).abs() < 1e-5, "paths, pixel {i}");
             }
         }
     }

@@ -13,7 +13,7 @@ fn names_are_read_back() {
     assert_eq!(
         names.join(" "),
         "rgba color line line.outline line.silhouette line.material line.crease line.uv line.feature line.camera \
-         line.reflection line.refraction below Z N P uv object feature"
+         line.reflection line.refraction line.hidden below Z N P uv object feature"
     );
 }
 
@@ -26,6 +26,7 @@ fn channels_are_named_as_compositing_programs_expect() {
         ("line", "line.R line.G line.B line.A", Half),
         ("line.crease", "line.crease.R line.crease.G line.crease.B line.crease.A", Half),
         ("line.camera", "line.camera.R line.camera.G line.camera.B line.camera.A", Half),
+        ("line.hidden", "line.hidden.R line.hidden.G line.hidden.B line.hidden.A", Half),
         ("below", "below.R below.G below.B below.A", Half),
         ("Z", "Z", Float),
         ("N", "N.X N.Y N.Z", Float),
@@ -50,7 +51,7 @@ fn unknown_names_are_errors_with_the_nearest_name() {
     assert_eq!(
         error("beauty_pass", &["ink"]),
         "error: there is no layer `beauty_pass` (layers are rgba, color, line, line.outline, line.silhouette, \
-         line.material, line.crease, line.uv, line.feature, line.camera, line.reflection, line.refraction, below, Z, N, P, uv, object, feature, aov_ink)"
+         line.material, line.crease, line.uv, line.feature, line.camera, line.reflection, line.refraction, line.hidden, below, Z, N, P, uv, object, feature, aov_ink)"
     );
     assert_eq!(error("aov_inc", &["ink"]), "error: no shader of this scene writes `aov_inc` (did you mean `aov_ink`?)");
     let error: Diagnostic = "colour".parse::<Layer>().unwrap_err();

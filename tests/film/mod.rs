@@ -99,6 +99,7 @@ impl Samples {
             priority: Column::Constant(0),
             throughput: Column::Constant([1.0; 3]),
             contribution: Column::Constant([0.0; 3]),
+            behind: Vec::new(),
         };
         let buffer = SampleBuffer {
             rect,
@@ -144,7 +145,8 @@ fn rects(rect: PixelRect, side: i32) -> Vec<PixelRect> {
 }
 
 fn line(color: [f32; 3], fired: Fired) -> SeenLine {
-    SeenLine { color, alpha: 1.0, lined: color, path: NodePath::CAMERA, fired, neighbor: ([0, 0], 0), own: true }
+    let (path, neighbor) = (NodePath::CAMERA, ([0, 0], 0));
+    SeenLine { color, alpha: 1.0, lined: color, path, fired, neighbor, own: true, hidden: false }
 }
 
 fn hash(x: i32, y: i32, s: u32, salt: u32) -> u32 {

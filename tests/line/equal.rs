@@ -4,7 +4,8 @@ use proptest::prelude::*;
 use tusche::line::{LineBuffer, Method, Rules, SeenLine};
 use tusche::math::Vec3;
 use tusche::sample::{HandMadeSample, Node, NodePath, PixelRect, SampleBuffer, SampleColor};
-use tusche::scene::settings::{Composition, LineOverrides, LineSettings, LineType, RayKinds, TypeStyle};
+use tusche::scene::ids::ObjectId;
+use tusche::scene::settings::{Composition, HiddenLines, LineOverrides, LineSettings, LineType, RayKinds, TypeStyle};
 
 use super::picture::{Tiles, layout};
 
@@ -14,6 +15,7 @@ struct Sample {
     offset: [f32; 2],
     color: [f32; 3],
     nodes: Vec<(NodePath, Node)>,
+    behind: Vec<(NodePath, Node)>,
 }
 
 #[derive(Clone)]
@@ -88,12 +90,23 @@ fn sample() -> impl Strategy<Value = Sample> {
         [0.0..1.0f32, 0.0..1.0f32, 0.0..1.0f32],
         node(),
         proptest::collection::btree_map(few(deeper), node(), 0..3),
+        // Up to four behind each, now and then more than a list can hold.
+        proptest::collection::vec((few([camera, camera, deeper[0], deeper[1], deeper[2]]), node()), 0..6),
     )
-        .prop_map(move |(offset, color, first, deeper)| Sample {
+        .prop_map(move |(offset, color, first, deeper, behind)| Sample {
             offset,
             color,
             nodes: [(camera, first)].into_iter().chain(deeper).collect(),
+            behind,
         })
+}
+
+/// Of no, all, or some objects; the settings of a scene have them only beside lists, but nothing breaks without.
+fn hidden() -> impl Strategy<Value = Option<HiddenLines>> {
+    let objects = few([None, Some(vec![]), Some(vec![ObjectId(0)]), Some(vec![ObjectId(0), ObjectId(1)])]);
+    let style = (few([0.0, 0.1, 1.0, 4.0]), objects);
+    let style = style.prop_map(|(width, objects)| HiddenLines { color: Vec3::new(0.5, 0.0, 1.0), width, objects });
+    proptest::option::of(style)
 }
 
 fn settings() -> impl Strategy<Value = LineSettings> {
@@ -101,7 +114,7 @@ fn settings() -> impl Strategy<Value = LineSettings> {
     (
         (any::<bool>(), any::<bool>(), threshold(&[0.0, 0.25, 0.4]), threshold(&[0.0, 1.0, 90.0, 179.9, 180.0])),
         (threshold(&[0.0, 0.25, 0.3]), few([0.0, 0.5, 1.0]), any::<bool>(), few([1.0, 3.0, 5.0, 20.0])),
-        (any::<bool>(), any::<bool>(), 0..8u8, threshold(&[0.0, 0.5, 1.0, 2.0])),
+        (any::<bool>(), any::<bool>(), 0..8u8, few([1, 1, 2, 3, 4]), hidden(), threshold(&[0.0, 0.5, 1.0, 2.0])),
         types(),
     )
         .prop_map(
@@ -112,7 +125,7 @@ fn settings() -> impl Strategy<Value = LineSettings> {
                     uv,
                     normal,
                     feature,
-                    overlap: rest.3,
+                    overlap: rest.5,
                     min_width,
                     width_compensation,
                     max_width,
@@ -124,6 +137,8 @@ fn settings() -> impl Strategy<Value = LineSettings> {
                     color: Vec3::ZERO,
                     width: 2.0,
                     types,
+                    surfaces: rest.3,
+                    hidden: rest.4,
                 }
             },
         )
@@ -224,7 +239,7 @@ impl Case {
                 let first = pixel * self.samples_per_pixel as usize;
                 samples.extend(self.samples[first..first + self.samples_per_pixel as usize].iter().map(|sample| {
                     let color = SampleColor { color: sample.color, alpha: 1.0 };
-                    HandMadeSample { offset: sample.offset, color, nodes: &sample.nodes }
+                    HandMadeSample { offset: sample.offset, color, nodes: &sample.nodes, behind: &sample.behind }
                 }));
             }
         }
@@ -255,7 +270,7 @@ type Bits = (Vec<u32>, String);
 
 fn bits(line: &SeenLine) -> Bits {
     let floats = line.color.iter().chain(&line.lined).chain([&line.alpha]).map(|x| x.to_bits()).collect();
-    (floats, format!("{} {:?} {:?} {}", line.path, line.fired, line.neighbor, line.own))
+    (floats, format!("{}/{} {:?} {:?} {}", line.path, line.hidden, line.fired, line.neighbor, line.own))
 }
 
 proptest! {

@@ -6,6 +6,7 @@ mod baselines;
 mod buffer;
 mod convergence;
 mod equal;
+mod lists;
 mod objects;
 mod overlap;
 pub mod picture;

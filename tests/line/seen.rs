@@ -28,7 +28,8 @@ const MISS: fn() -> Node = Node::default;
 fn lines_of(samples: &[(f32, &[(NodePath, Node)])], settings: &LineSettings) -> LineBuffer {
     let rect = PixelRect { x0: 0, y0: 0, x1: samples.len() as i32, y1: 1 };
     let color = SampleColor { color: GRAY, alpha: 1.0 };
-    let samples: Vec<_> = samples.iter().map(|&(x, nodes)| HandMadeSample { offset: [x, 0.5], color, nodes }).collect();
+    let samples: Vec<_> =
+        samples.iter().map(|&(x, nodes)| HandMadeSample { offset: [x, 0.5], color, nodes, behind: &[] }).collect();
     let buffer = SampleBuffer::from_samples(rect, &layout(1, settings.max_width), &samples);
     let rules = Rules::new(settings, 1);
     let bounds = TileBounds::new(&buffer, &rules);

@@ -7,10 +7,11 @@ use proptest::prelude::*;
 use tusche::math::{DVec3, Vec2, Vec3, Vec4};
 use tusche::scene::camera::Projection;
 use tusche::scene::file::{LoadOptions, load};
+use tusche::scene::ids::ObjectId;
 use tusche::scene::light::LightKind;
 use tusche::scene::material::ParamValue;
 use tusche::scene::settings::{
-    Background, Composition, FilterKind, LineSettings, LineType, RayKinds, RenderSettings, TypeStyle,
+    Background, Composition, FilterKind, HiddenLines, LineSettings, LineType, RayKinds, RenderSettings, TypeStyle,
 };
 use tusche::scene::shape::Shape;
 use tusche::scene::texture::{Pixels, TextureFilter, Wrap};
@@ -71,6 +72,12 @@ fn every_setting_is_taken_over() {
                 }
                 LineType::Outline => TypeStyle { width: Some(6.0), ..TypeStyle::default() },
                 _ => TypeStyle::default(),
+            }),
+            surfaces: 3,
+            hidden: Some(HiddenLines {
+                color: Vec3::new(0.2, 0.3, 0.4),
+                width: 0.75,
+                objects: Some(vec![ObjectId(0)]),
             }),
         }
     );

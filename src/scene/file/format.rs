@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::scene::check::{MAX_LINE_WIDTH, MAX_SAMPLES, MAX_SIZE};
+use crate::scene::check::{MAX_LINE_WIDTH, MAX_SAMPLES, MAX_SIZE, MAX_SURFACES};
 use crate::scene::shape::MAX_SEGMENTS;
 
 /// Largest coordinate and length, in world units.
@@ -255,9 +255,13 @@ pub(super) struct Lines {
     pub compose: Compose,
     /// What types of lines change about what their shaders ask for.
     pub types: LineTypes,
-    /// How many surfaces along a camera ray take part in the tests. Only 1 is built yet.
-    #[schemars(range(min = 1, max = 64))]
+    /// How many surfaces along a ray take part in the tests. With 1, a line is lost where an object that draws none covers
+    /// what would tell of it. While only objects and materials are compared, an object counts once for each material,
+    /// where the ray first meets it; else each time the ray meets it.
+    #[schemars(range(min = 1, max = MAX_SURFACES))]
     pub surfaces: u32,
+    /// Draws lines of what is hidden, in a style of their own, where no other line is. Needs `surfaces` above 1.
+    pub hidden: Option<HiddenLines>,
 }
 
 impl Default for Lines {
@@ -279,6 +283,7 @@ impl Default for Lines {
             compose: Compose::Replace,
             types: LineTypes::default(),
             surfaces: 1,
+            hidden: None,
         }
     }
 }
@@ -315,6 +320,26 @@ pub(super) struct LineTypeStyle {
     /// Multiplies the opacity.
     #[schemars(range(min = 0, max = 1))]
     pub opacity: Option<f64>,
+}
+
+/// `[lines.hidden]`: how lines of surfaces behind the first are drawn.
+#[derive(Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub(super) struct HiddenLines {
+    /// Colour of hidden lines.
+    pub color: Color,
+    /// Full width in pixels of hidden lines; 0 is no line.
+    #[schemars(range(min = 0, max = MAX_LINE_WIDTH))]
+    pub width: f64,
+    /// Names of the objects whose hidden lines are drawn; the name of a model stands for all its parts, an
+    /// object in a group for the group. Default: all.
+    pub objects: Option<Vec<String>>,
+}
+
+impl Default for HiddenLines {
+    fn default() -> Self {
+        Self { color: Color([0.5; 3]), width: 1.0, objects: None }
+    }
 }
 
 /// A line test: `false`, or the difference from which on it draws.

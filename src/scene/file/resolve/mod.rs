@@ -61,6 +61,7 @@ pub(super) fn resolve(file: &SceneFile, node: &Node, context: Context<'_>, fault
     resolver.lines(&file.lines);
     resolver.materials(&file.materials);
     let model_lights = resolver.objects(&file.objects, file.lights.is_empty() && !node.mentions("lights"));
+    resolver.hidden_objects(file);
     script_files::load(&mut resolver.scene, context.files, resolver.faults);
     resolver.lights(&file.lights, model_lights);
     resolver.cameras(file);

@@ -1,13 +1,17 @@
 //! `[render]` and `[lines]`.
 
+use std::collections::BTreeSet;
+
 use super::super::document::Node;
 use super::super::format;
-use super::{Resolver, rgb};
+use super::{Resolver, rgb, unknown_name};
 use crate::diag::Diagnostic;
 use crate::math::Vec3;
 use crate::scene::check::MAX_PIXELS;
+use crate::scene::ids::ObjectId;
 use crate::scene::settings::{
-    Background, Composition, FilterKind, LineOverrides, LineSettings, LineType, RayKinds, RenderSettings, TypeStyle,
+    Background, Composition, FilterKind, HiddenLines, LineOverrides, LineSettings, LineType, RayKinds, RenderSettings,
+    TypeStyle,
 };
 use crate::scene::texture::{Texture, TextureFilter, Wrap};
 
@@ -74,10 +78,6 @@ impl Resolver<'_> {
 
     pub(super) fn lines(&mut self, lines: &format::Lines) {
         let node = self.part("lines");
-        if lines.surfaces > 1 {
-            let fault = Diagnostic::error("surface lists are not built yet: `surfaces` can only be 1");
-            self.faults.push(fault.at(node.span_of("surfaces")));
-        }
         self.check_angle(lines.normal, "lines.normal", node);
         if lines.max_width == 0.0 {
             if lines.width > 0.0 {
@@ -94,6 +94,17 @@ impl Resolver<'_> {
             self.faults.push(warning.hint(format!("set `max_width = {}`, too", lines.width)));
         }
         let types = self.line_types(lines, node);
+        let has_lists = lines.surfaces > 1 || (node.mentions("surfaces") && node.get("surfaces").is_none());
+        if lines.hidden.is_some() && !has_lists {
+            let fault = Diagnostic::error("hidden lines need surface lists: `lines.surfaces` is 1");
+            let hint = "set `surfaces = 4` in [lines], or more where more lies behind each other";
+            self.faults.push(fault.at(node.key_span("hidden")).hint(hint));
+        }
+        if let Some(hidden) = lines.hidden.as_ref().filter(|hidden| hidden.width > lines.max_width) {
+            let message = format!("hidden lines are drawn {} pixels wide, as `max_width` says", lines.max_width);
+            let warning = Diagnostic::warning(message).at(node.get("hidden").unwrap_or(node).span_of("width"));
+            self.faults.push(warning.hint(format!("set `max_width = {}` in [lines], too", hidden.width)));
+        }
         let paths = lines.paths.iter().map(|path| match path {
             format::LinePath::Camera => RayKinds::CAMERA,
             format::LinePath::Reflection => RayKinds::REFLECTION,
@@ -119,7 +130,40 @@ impl Resolver<'_> {
                 format::Compose::Throughput => Composition::Throughput,
             },
             types,
+            surfaces: lines.surfaces,
+            hidden: lines.hidden.as_ref().map(|hidden| HiddenLines {
+                color: rgb(hidden.color),
+                width: hidden.width as f32,
+                objects: None,
+            }),
         };
+    }
+
+    /// Finds the objects whose hidden lines are drawn. The objects must be there.
+    pub(super) fn hidden_objects(&mut self, file: &format::SceneFile) {
+        let Some(names) = file.lines.hidden.as_ref().and_then(|hidden| hidden.objects.as_ref()) else { return };
+        let listed = self.part("lines").get("hidden").and_then(|hidden| hidden.get("objects"));
+        let mut objects = BTreeSet::new();
+        for (name, node) in names.iter().zip(listed.map_or(&[][..], Node::items)) {
+            let part = format!("{name}/");
+            let placed = self.scene.objects.iter().enumerate();
+            let found: Vec<_> = placed
+                .filter(|(_, object)| object.name == *name || object.name.starts_with(&part))
+                .map(|(index, _)| ObjectId::from_index(index))
+                .collect();
+            // An object that could not be made was reported where it stands.
+            let written = file.objects.iter().filter_map(|object| object.name.as_deref());
+            let lost = self.node.mentions("objects") && self.node.get("objects").is_none();
+            if found.is_empty() && !lost && !written.clone().any(|known| known == name) {
+                let known: BTreeSet<&str> =
+                    self.scene.objects.iter().map(|object| object.name.as_str()).chain(written).collect();
+                self.faults.push(unknown_name("object", name, known.iter().copied()).at(node.span.clone()));
+            }
+            objects.extend(found);
+        }
+        if let Some(hidden) = &mut self.scene.lines.hidden {
+            hidden.objects = Some(objects.into_iter().collect());
+        }
     }
 
     /// In the order of [`LineType::ALL`].
