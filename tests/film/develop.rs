@@ -140,8 +140,8 @@ fn layers_rebuild_the_picture() {
                 let tolerance = 3.0 / 2048.0 * rgba.abs().max(below.abs()).max(1.0);
                 assert!((over - rgba).abs() < tolerance, "{kind:?}, pixel {i}, channel {channel}: {over}, not {rgba}");
                 let sum = |layers: std::ops::Range<usize>| layers.map(|layer| value(layer, channel, i)).sum::<f32>();
-                assert!((sum(3..9) - value(1, channel, i)).abs() < 1e-5, "types, pixel {i}");
-                assert!((sum(9..12) - value(1, channel, i)).abs() < 1e-5, "paths, pixel {i}");
+                assert!((sum(3..10) - value(1, channel, i)).abs() < 1e-5, "types, pixel {i}");
+                assert!((sum(10..13) - value(1, channel, i)).abs() < 1e-5, "paths, pixel {i}");
             }
         }
     }
@@ -266,7 +266,7 @@ fn line_types_add_up_to_all_lines() {
     assert!(tile.channels[3].iter().any(|alpha| *alpha > 0.1));
     for i in 0..tile.rect.pixels() {
         for component in 0..4 {
-            let types: f32 = (1..7).map(|layer| tile.channels[4 * layer + component][i]).sum();
+            let types: f32 = (1..8).map(|layer| tile.channels[4 * layer + component][i]).sum();
             assert!((types - tile.channels[component][i]).abs() < 1e-5);
         }
     }
