@@ -19,6 +19,7 @@ mod light;
 mod line;
 mod trace;
 // ... and the whole.
+mod flicker;
 mod same_bits;
 mod truth;
 mod why;

@@ -21,15 +21,19 @@ mod pair;
 mod rules;
 mod search;
 mod style;
+mod types;
 mod window;
 
 pub use bounds::TileBounds;
 pub use differ::Fired;
 pub use inspect::{InspectedPair, TestResult, inspect, nearest_difference};
 pub use rules::Rules;
+pub use style::LineScripts;
 pub use window::{LineTile, Window};
 
-use crate::sample::{NodePath, PixelRect};
+pub use crate::scene::settings::LineType;
+
+use crate::sample::{GateCounts, NodePath, PixelRect};
 use pair::LineNode;
 use window::PathTile;
 
@@ -45,41 +49,6 @@ pub enum Method {
     Choudhury,
     /// Bauer 2017: one style, a contour image of sub-pixels; camera nodes only.
     Bauer,
-}
-
-/// What kind of feature a line marks (DESIGN section 3.6), by the strongest reason, in this order.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum LineType {
-    /// One side is a miss.
-    Outline,
-    /// The objects differ.
-    Silhouette,
-    /// The object folds over itself.
-    Overlap,
-    /// The materials differ.
-    Material,
-    /// The normals differ.
-    Crease,
-    /// The texture coordinates differ.
-    Uv,
-    /// The feature colours differ.
-    Feature,
-}
-
-impl LineType {
-    /// As in the layer `line.TYPE`.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Outline => "outline",
-            Self::Silhouette => "silhouette",
-            Self::Overlap => "overlap",
-            Self::Material => "material",
-            Self::Crease => "crease",
-            Self::Uv => "uv",
-            Self::Feature => "feature",
-        }
-    }
 }
 
 /// The line that a sample sees. With [`Rules::with_any_pair`], `fired`, `neighbor` and `own` may be those of another pair
@@ -113,6 +82,8 @@ pub struct LineBuffer {
     pub lines: Vec<SeenLine>,
     /// Work done, for `--stats`.
     pub counts: LineCounts,
+    /// What scripts gave for lines that is no number, by `shader` value; may be shorter than there are materials.
+    pub gate: Vec<GateCounts>,
 }
 
 /// Work done by the line pass.
@@ -140,11 +111,20 @@ impl std::ops::AddAssign for LineCounts {
 /// A line that is not opaque (thinner than the minimum width, or with an opacity) shows the next one in the order of keys,
 /// and so on until they are opaque. Each surface (object and material) draws or borders at most one of a sample's lines at
 /// a path, else the many pairs that see one edge would count as many lines; there are at most 8.
+///
+/// `scripts` style the lines of materials that [`Rules::with_scripts`] names.
 #[must_use]
-pub fn find_lines(window: &Window<'_>, target: LineTile<'_>, rules: &Rules, method: Method) -> LineBuffer {
+pub fn find_lines(
+    window: &Window<'_>,
+    target: LineTile<'_>,
+    rules: &Rules,
+    method: Method,
+    mut scripts: Option<&mut (dyn LineScripts + '_)>,
+) -> LineBuffer {
     let mut lined = vec![false; target.buffer.samples()];
     let mut lines: Vec<(u32, SeenLine)> = Vec::new();
     let mut counts = LineCounts::default();
+    let mut gate = Vec::new();
     for nodes in &target.buffer.paths {
         let Some(targets) = PathTile::new(target, nodes.path) else { continue };
         let window = window.at_path(nodes.path);
@@ -160,16 +140,13 @@ pub fn find_lines(window: &Window<'_>, target: LineTile<'_>, rules: &Rules, meth
                 break;
             }
         };
-        for found in found {
-            let sample = nodes.rows.sample(found.row);
-            if let Some(line) = style::style(&window, &targets, &found, rules) {
-                lined[sample as usize] = true;
-                lines.push((sample, line));
-            }
+        for (sample, line) in style::style(&window, &targets, &found, rules, scripts.as_deref_mut(), &mut gate) {
+            lined[sample as usize] = true;
+            lines.push((sample, line));
         }
     }
     lines.sort_unstable_by_key(|&(sample, _)| sample);
     counts.lined_samples = lines.len() as u64;
     let (samples, lines) = lines.into_iter().unzip();
-    LineBuffer { rect: target.buffer.rect, samples, lines, counts }
+    LineBuffer { rect: target.buffer.rect, samples, lines, counts, gate }
 }

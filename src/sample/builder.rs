@@ -241,8 +241,10 @@ impl PathRows {
         if kept.member {
             self.member.push(row, node.member, expected);
         }
-        if kept.overlap {
+        if kept.overlap || kept.position {
             self.position.push(row, node.position, expected);
+        }
+        if kept.overlap {
             self.geometric_normal.push(row, node.geometric_normal, expected);
             self.footprint.push(row, node.footprint, expected);
         }

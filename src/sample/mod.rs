@@ -11,10 +11,12 @@
 pub mod buffer;
 pub mod builder;
 pub mod gate;
+pub mod pair;
 pub mod path;
 pub mod position;
 
 pub use buffer::{Column, Node, NodeColumnSet, NodeColumns, PixelRect, Rows, SampleBuffer, SampleColor};
 pub use builder::{HandMadeSample, SampleBufferBuilder, SampleLayout};
 pub use gate::GateCounts;
+pub use pair::{PairBatch, PairSide};
 pub use path::NodePath;

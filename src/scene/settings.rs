@@ -97,6 +97,56 @@ bitflags! {
     }
 }
 
+/// What kind of feature a line marks (DESIGN section 3.6), by the strongest reason, in this order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum LineType {
+    /// One side is a miss.
+    Outline,
+    /// The objects differ.
+    Silhouette,
+    /// The object folds over itself.
+    Overlap,
+    /// The materials differ.
+    Material,
+    /// The normals differ.
+    Crease,
+    /// The texture coordinates differ.
+    Uv,
+    /// The feature colours differ.
+    Feature,
+}
+
+impl LineType {
+    /// All of them, the strongest reason first.
+    pub const ALL: [Self; 7] =
+        [Self::Outline, Self::Silhouette, Self::Overlap, Self::Material, Self::Crease, Self::Uv, Self::Feature];
+
+    /// As layers, scene files and scripts call it.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Outline => "outline",
+            Self::Silhouette => "silhouette",
+            Self::Overlap => "overlap",
+            Self::Material => "material",
+            Self::Crease => "crease",
+            Self::Uv => "uv",
+            Self::Feature => "feature",
+        }
+    }
+}
+
+/// What a type of line changes about what its shader asks for.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct TypeStyle {
+    /// Colour, linear.
+    pub color: Option<Vec3>,
+    /// Full width in pixels; 0 draws none of the type.
+    pub width: Option<f32>,
+    /// Multiplies the opacity, 0 … 1.
+    pub opacity: Option<f32>,
+}
+
 /// How a line at a reflected or refracted node enters the sample's colour.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Composition {
@@ -139,6 +189,8 @@ pub struct LineSettings {
     pub tint: bool,
     /// How they enter the sample.
     pub compose: Composition,
+    /// What each type changes, in the order of [`LineType::ALL`].
+    pub types: [TypeStyle; LineType::ALL.len()],
 }
 
 impl Default for LineSettings {
@@ -159,6 +211,7 @@ impl Default for LineSettings {
             paths: RayKinds::CAMERA.union(RayKinds::REFLECTION).union(RayKinds::REFRACTION),
             tint: true,
             compose: Composition::Replace,
+            types: [TypeStyle::default(); LineType::ALL.len()],
         }
     }
 }

@@ -7,12 +7,14 @@ use std::sync::Arc;
 use rhai::{Caches, Dynamic, Engine, EvalAltResult};
 
 use super::batch::{HitBatch, OutputBatch};
-use super::kernel::{Kernel, Registers, Slice};
+use super::kernel::{Batch, Kernel, Registers, Slice};
 use super::library::Hit;
+use super::line::{self, LineRow, LineStyles};
 use super::names::OutputSet;
 use super::output::{self, Row};
 use super::program::{Mode, Shader, Shaders};
 use crate::diag::{Diagnostic, Diagnostics};
+use crate::sample::PairBatch;
 use crate::scene::Scene;
 use crate::scene::ids::MaterialId;
 
@@ -84,6 +86,8 @@ struct Memory {
     caches: Caches,
     /// The one result of a constant shader, or of a shader that ran out of operations.
     fixed: Option<Result<Row, Diagnostic>>,
+    /// What is said of a `line` that ran out of operations.
+    fixed_line: Option<Diagnostic>,
     /// Kernels and slices, by number of lights and by outputs.
     slices: Vec<(usize, OutputSet, Arc<Kernel>, Arc<Slice>)>,
 }
@@ -95,6 +99,8 @@ pub struct Shading<'a> {
     memories: Vec<Memory>,
     batch: Arc<HitBatch>,
     registers: Registers,
+    /// What a kernel of `line` writes.
+    line_outputs: OutputBatch,
     /// Rows that a kernel has given up.
     failed: Vec<usize>,
     evaluations: u64,
@@ -118,6 +124,7 @@ impl<'a> Shading<'a> {
             memories,
             batch: Arc::default(),
             registers: Registers::default(),
+            line_outputs: OutputBatch::default(),
             failed: Vec::new(),
             evaluations: 0,
             kernel_hits: 0,
@@ -218,7 +225,8 @@ impl<'a> Shading<'a> {
         let shader = self.shaders.of(material);
         let mut failed = std::mem::take(&mut self.failed);
         failed.clear();
-        kernel.run(slice, hits, self.shaders.aovs(), &mut self.registers, outputs, &mut failed);
+        let batch = Batch { hits, pairs: None };
+        kernel.run(slice, batch, self.shaders.aovs(), &mut self.registers, outputs, &mut failed);
         output::fill_up(hits.len, wanted, outputs);
         self.kernel_hits += hits.len as u64;
         if !failed.is_empty() {
@@ -244,6 +252,92 @@ impl<'a> Shading<'a> {
             }
         }
         self.failed = failed;
+    }
+
+    /// Styles lines of one material, whose shader must have a `line`: [`Shader::styles_lines`]. A line whose script
+    /// fails gets the marker's colour, opaque. A script that ran out of operations is not run again in this context.
+    pub fn style(
+        &mut self,
+        material: MaterialId,
+        pairs: &PairBatch,
+        styles: &mut LineStyles,
+        errors: &mut ShadeErrors,
+    ) {
+        let LineStyles { color, opacity } = styles;
+        color.clear();
+        opacity.clear();
+        let shader = self.shaders.of(material);
+        let Some(line) = &shader.line else {
+            color.resize(pairs.len, None);
+            opacity.resize(pairs.len, 1.0);
+            return;
+        };
+        let mut failed = std::mem::take(&mut self.failed);
+        failed.clear();
+        match line.kernel().filter(|_| self.memories[material.index()].fixed_line.is_none()) {
+            Some(kernel) => {
+                let slice = kernel.slice(line::WRITTEN);
+                let mut outputs = std::mem::take(&mut self.line_outputs);
+                output::start(&mut outputs, 0);
+                let batch = Batch { hits: &HitBatch::default(), pairs: Some(pairs) };
+                kernel.run(&slice, batch, &[], &mut self.registers, &mut outputs, &mut failed);
+                output::fill_up(pairs.len, line::WRITTEN, &mut outputs);
+                color.extend_from_slice(&outputs.color);
+                opacity.extend_from_slice(&outputs.opacity);
+                self.line_outputs = outputs;
+            }
+            None => {
+                color.resize(pairs.len, None);
+                opacity.resize(pairs.len, 1.0);
+                failed.extend(0..pairs.len);
+            }
+        }
+        for &row in &failed {
+            let known = self.memories[material.index()].fixed_line.clone();
+            let result = known.map_or_else(|| self.style_one(shader, material, pairs, row), Err);
+            // A script without end is given up from here on, whether there is a kernel or not.
+            let endless = self.memories[material.index()].fixed_line.is_some();
+            let rows = if endless { row..pairs.len } else { row..row + 1 };
+            let style = result.unwrap_or_else(|fault| {
+                errors.add(fault, rows.len() as u64);
+                LineRow::MARKER
+            });
+            color[rows.clone()].fill(style.color);
+            opacity[rows].fill(style.opacity);
+            if endless {
+                break;
+            }
+        }
+        self.failed = failed;
+    }
+
+    /// Runs `line` for one line.
+    fn style_one(
+        &mut self,
+        shader: &Shader,
+        material: MaterialId,
+        pairs: &PairBatch,
+        row: usize,
+    ) -> Result<LineRow, Diagnostic> {
+        self.evaluations += 1;
+        let program = &shader.program;
+        // A shader that has no `line` is never asked.
+        let function = program.line.as_ref().unwrap_or(&program.surface);
+        let memory = &mut self.memories[material.index()];
+        let arguments = [line::pair_record(pairs, row), Dynamic::from(shader.record.clone())];
+        match program.run(&self.engine, &mut memory.caches, function, arguments) {
+            Ok(value) => LineRow::read(&value).map_err(|fault| {
+                let place = fault.key.and_then(|key| program.key_span(&key));
+                fault.fault.at(place.unwrap_or_else(|| function.span.clone()))
+            }),
+            Err(error) => {
+                let fault = program.explain(&error);
+                if matches!(*error, EvalAltResult::ErrorTooManyOperations(_)) {
+                    memory.fixed_line = Some(fault.clone());
+                }
+                Err(fault)
+            }
+        }
     }
 
     /// Runs `surface` at one hit. The second value tells whether it ran out of operations.

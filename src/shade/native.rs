@@ -487,7 +487,7 @@ impl Constant for i64 {}
 impl Constant for f32 {}
 
 /// Words with a meaning of their own: the engine's functions and what a shader defines.
-const RESERVED: [&str; 83] = [
+const RESERVED: [&str; 85] = [
     "all",
     "append",
     "bits",
@@ -527,6 +527,7 @@ const RESERVED: [&str; 83] = [
     "is_zero",
     "keys",
     "len",
+    "line",
     "make_lower",
     "make_upper",
     "map",
@@ -536,6 +537,7 @@ const RESERVED: [&str; 83] = [
     "order_desc",
     "p",
     "pad",
+    "pair",
     "params",
     "pop",
     "print",

@@ -127,7 +127,7 @@ fn mistyped(key: &str, wanted: &str, value: &Dynamic) -> Fault {
     Fault::new(format!("the output `{key}` must be {wanted}, but it is {}", kind(value)))
 }
 
-fn number(key: &str, value: &Dynamic) -> Result<f32, Fault> {
+pub(super) fn number(key: &str, value: &Dynamic) -> Result<f32, Fault> {
     #[expect(clippy::cast_precision_loss, reason = "an int counts as the nearest float")]
     value.as_float().or_else(|_| value.as_int().map(|x| x as f32)).map_err(|_| mistyped(key, "a number", value))
 }
@@ -136,7 +136,7 @@ fn vector(key: &str, value: &Dynamic) -> Result<Vec3, Fault> {
     value.read_lock::<Vec3>().map(|v| *v).ok_or_else(|| mistyped(key, "a vec3", value))
 }
 
-fn color(key: &str, value: &Dynamic) -> Result<Vec3, Fault> {
+pub(super) fn color(key: &str, value: &Dynamic) -> Result<Vec3, Fault> {
     if let Some(color) = value.read_lock::<Vec3>() {
         return Ok(*color);
     }

@@ -9,10 +9,11 @@ use super::analysis::{self, Analysis, Finding};
 use super::host::Host;
 use super::kernel::{Kernel, Surroundings};
 use super::library::ParameterRecord;
-use super::names::{InputSet, OutputSet};
+use super::line::LineShader;
+use super::names::{InputSet, OutputSet, PairSet};
 use super::native::NativeFunction;
 use super::params::{self, Params};
-use super::script::Program;
+use super::script::{Entry, Program};
 use crate::diag::{Diagnostic, Diagnostics};
 use crate::scene::Scene;
 use crate::scene::attributes::AttributeSet;
@@ -64,6 +65,8 @@ pub struct Shader {
     pub(super) record: ParameterRecord,
     /// The kernel, or why there is none; `None` if the interpreter was asked for.
     kernel: Option<Result<Arc<Kernel>, Finding>>,
+    /// What styles lines, if the script has such a function.
+    pub(super) line: Option<LineShader>,
     /// Kernels for batches with another number of lights than the scene has.
     other_kernels: Mutex<Vec<(usize, Option<Arc<Kernel>>)>>,
     material_id: u32,
@@ -146,12 +149,38 @@ impl Shader {
         if let Some((_, kernel)) = others.iter().find(|(count, _)| *count == light_count) {
             return kernel.clone();
         }
-        let kernel = self.lower(light_count).ok();
+        let kernel = self.lower(Entry::Surface, light_count).ok();
         others.push((light_count, kernel.clone()));
         kernel
     }
 
-    fn lower(&self, light_count: usize) -> Result<Arc<Kernel>, Finding> {
+    /// Whether its script has a `line`, so that seen lines must be given to [`Shading::style`](super::Shading::style).
+    #[must_use]
+    pub fn styles_lines(&self) -> bool {
+        self.line.is_some()
+    }
+
+    /// The columns of a [`PairBatch`](crate::sample::PairBatch) that must be filled for its `line`; none without one.
+    #[must_use]
+    pub fn pair_needs(&self) -> PairSet {
+        self.line.as_ref().map_or(PairSet::empty(), LineShader::needs)
+    }
+
+    /// How its `line` is run; `None` without one.
+    #[must_use]
+    pub fn line_mode(&self) -> Option<Mode> {
+        let line = self.line.as_ref()?;
+        Some(if line.kernel().is_some() { Mode::Kernel } else { Mode::Interpreted })
+    }
+
+    /// The construct that keeps its `line` from being a kernel, at its place.
+    #[must_use]
+    pub fn line_blame(&self) -> Option<Diagnostic> {
+        let blame = self.line.as_ref()?.kernel.as_ref()?.as_ref().err()?;
+        Some(self.program.found(blame))
+    }
+
+    fn lower(&self, entry: Entry, light_count: usize) -> Result<Arc<Kernel>, Finding> {
         let surroundings = Surroundings {
             textures: &self.textures,
             attributes: &self.attributes,
@@ -159,7 +188,7 @@ impl Shader {
             material_id: self.material_id,
             light_count: Some(light_count),
         };
-        Kernel::new(&self.program, &self.params, surroundings).map(Arc::new)
+        Kernel::new(&self.program, entry, &self.params, surroundings).map(Arc::new)
     }
 
     /// The program of its kernel for all outputs, if it has one: for people, and for golden texts.
@@ -221,8 +250,18 @@ impl Shaders {
             let Some((program, defaults)) = &scripts[material.script.index()] else { continue };
             match params::resolve(defaults.clone(), material, program) {
                 Ok(params) => {
-                    let analysis = analysis::analyse_program(program, &params, scene.textures(), &attributes);
-                    for finding in &analysis.findings {
+                    let analyse = |entry, attributes: &[&AttributeSet]| {
+                        analysis::analyse_program(program, entry, &params, scene.textures(), attributes)
+                    };
+                    let mut analysis = analyse(Entry::Surface, &attributes);
+                    let line = program.line.as_ref().map(|_| analyse(Entry::Line, &[]));
+                    if let Some(line) = &line {
+                        analysis.parameters.extend(line.parameters.iter().cloned());
+                        if !line.complete {
+                            analysis.parameters.extend(params.0.keys().cloned());
+                        }
+                    }
+                    for finding in analysis.findings.iter().chain(line.iter().flat_map(|line| &line.findings)) {
                         let fault = program.found(finding);
                         // Materials that share a script share its faults.
                         if !faults.0.contains(&fault) {
@@ -236,6 +275,7 @@ impl Shaders {
                         params,
                         program: Arc::clone(program),
                         kernel: None,
+                        line: line.map(|_| LineShader { kernel: None }),
                         other_kernels: Mutex::default(),
                         material_id: MaterialId::from_index(index).0 + 1,
                         light_count: scene.lights().len(),
@@ -243,12 +283,19 @@ impl Shaders {
                         natives: Arc::clone(&natives),
                         attributes: Arc::clone(scene.attributes().sets()),
                     };
+                    let lights = shader.light_count;
                     if mode != ShadingMode::Interpreter && !shader.analysis.is_constant() {
-                        shader.kernel = Some(shader.lower(shader.light_count));
-                        if let (ShadingMode::Kernel, Some(fault)) = (mode, shader.blame_diagnostic())
-                            && !faults.0.contains(&fault)
-                        {
-                            faults.push(fault);
+                        shader.kernel = Some(shader.lower(Entry::Surface, lights));
+                    }
+                    if mode != ShadingMode::Interpreter && shader.line.is_some() {
+                        let kernel = Some(shader.lower(Entry::Line, lights));
+                        shader.line.iter_mut().for_each(|line| line.kernel.clone_from(&kernel));
+                    }
+                    if mode == ShadingMode::Kernel {
+                        for fault in shader.blame_diagnostic().into_iter().chain(shader.line_blame()) {
+                            if !faults.0.contains(&fault) {
+                                faults.push(fault);
+                            }
                         }
                     }
                     shaders.push(shader);

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use super::library;
-use super::names::{AOV_PREFIX, INPUTS, OUTPUTS};
+use super::names::{AOV_PREFIX, INPUTS, LINE_OUTPUTS, OUTPUTS, PAIR_INPUTS};
 
 /// What stands before the tables.
 const HEAD: &str = "\
@@ -37,6 +37,25 @@ fn surface(hit, p) {
 This page is made from the code: `tusche shader reference` prints it.
 ";
 
+/// What stands before the tables of `line`.
+const LINES: &str = "
+## Lines, one by one
+
+A shader may also have a function `line(pair, p)`. It is called for every line that a sample sees and that this shader
+styles, and may change its colour and opacity there: gradients across the line, ink that fades with depth, dashes, texture.
+
+```rust
+fn line(pair, p) {
+    if pair.kind == \"crease\" && pair.other.depth < pair.depth { return #{ opacity: 0.5 }; }
+    #{ color: mix(pair.color, p.paint, pair.distance), opacity: 1.0 - smoothstep(10.0, 40.0, pair.depth) }
+}
+```
+
+`pair` is the surface that styles the line; `pair.other` is what lies across the edge, and has the names from `object_id`
+on. Where lines are drawn, and how wide, is decided before.
+
+";
+
 /// The whole reference as Markdown: what `shaders/README.md` holds and `tusche shader reference` prints.
 #[must_use]
 pub fn markdown() -> String {
@@ -55,6 +74,15 @@ pub fn markdown() -> String {
     }
     let extra = code(&format!("{AOV_PREFIX}NAME"));
     row(&mut page, &[&extra, "colour or number", "", "", "0", "an extra layer of the picture, called NAME"]);
+    page += LINES;
+    page += "| name | type | unit or space | range | meaning |\n|---|---|---|---|---|\n";
+    for input in PAIR_INPUTS {
+        row(&mut page, &[&code(input.name), input.kind(), input.unit, input.range, input.about]);
+    }
+    page += "\n| key | type | range | default | meaning |\n|---|---|---|---|---|\n";
+    for [key, cells @ ..] in LINE_OUTPUTS {
+        row(&mut page, &[&[code(key).as_str()], &cells[..]].concat());
+    }
     page += "\n## Functions\n\n";
     page += "| call | types | meaning | example |\n|---|---|---|---|\n";
     for function in library::functions() {

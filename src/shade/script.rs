@@ -29,8 +29,44 @@ pub(super) struct Program {
     /// parameters.
     pub functions: Functions,
     pub surface: Function,
+    /// What styles lines, if there is such a function.
+    pub line: Option<Function>,
     params: Option<Function>,
     module: Option<(String, Arc<Module>)>,
+}
+
+/// A function of a script that the renderer calls for many rows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Entry {
+    /// `surface(hit, p)`, for every hit.
+    Surface,
+    /// `line(pair, p)`, or `line(pair)`, for every line that a sample sees.
+    Line,
+}
+
+impl Entry {
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Surface => "surface",
+            Self::Line => "line",
+        }
+    }
+
+    /// How it is written.
+    pub fn form(self) -> &'static str {
+        match self {
+            Self::Surface => "surface(hit, p)",
+            Self::Line => "line(pair, p)",
+        }
+    }
+
+    /// Numbers of parameters that it may have.
+    pub fn counts(self) -> &'static [usize] {
+        match self {
+            Self::Surface => &[2],
+            Self::Line => &[2, 1],
+        }
+    }
 }
 
 /// A function that a script or a module defines.
@@ -85,7 +121,9 @@ impl Program {
     pub fn parse(source: &Arc<Source>, files: &ScriptFiles, words: &Words) -> Result<Self, Diagnostics> {
         let Linked { files, ast, functions, module } = link(source, files, words)?;
         let mut faults = Diagnostics::default();
-        let surface = Self::find(&functions, "surface", 2, "surface(hit, p)", &mut faults);
+        let entry =
+            |entry: Entry, faults: &mut _| Self::find(&functions, entry.name(), entry.counts(), entry.form(), faults);
+        let surface = entry(Entry::Surface, &mut faults);
         if surface.is_none() && !faults.has_errors() {
             let fault = Fault::new("this shader has no function `surface`");
             let fault = match nearest(
@@ -98,37 +136,53 @@ impl Program {
             let hint = "write: fn surface(hit, p) { #{ base_color: rgb(0.8, 0.2, 0.1) } }";
             faults.push(fault.hint(hint).at(Span::new(source, 0..0)));
         }
-        let params = Self::find(&functions, "params", 0, "params()", &mut faults);
+        let line = entry(Entry::Line, &mut faults);
+        let params = Self::find(&functions, "params", &[0], "params()", &mut faults);
         match surface {
             Some(surface) if !faults.has_errors() => {
-                Ok(Self { source: Arc::clone(source), files, functions, surface, params, ast, module })
+                Ok(Self { source: Arc::clone(source), files, functions, surface, line, params, ast, module })
             }
             _ => Err(faults),
         }
     }
 
-    /// The script's own function of a name, if it has `count` parameters. One of that name with others only is a fault.
-    fn find(functions: &Functions, name: &str, count: usize, form: &str, faults: &mut Diagnostics) -> Option<Function> {
+    /// The script's own function of a name, if it has one of some numbers of parameters. One of that name with others
+    /// only is a fault.
+    fn find(
+        functions: &Functions,
+        name: &str,
+        counts: &[usize],
+        form: &str,
+        faults: &mut Diagnostics,
+    ) -> Option<Function> {
         let found: Vec<_> =
             functions.iter().filter(|(_, function)| function.name == name && function.file == 0).collect();
-        if let Some((_, function)) = found.iter().find(|((_, n), _)| *n == count) {
+        let of_count = |count: &usize| found.iter().find(|((_, n), _)| n == count);
+        if let Some((_, function)) = counts.iter().find_map(of_count) {
             let ScriptFunction { parameters, body, span, .. } = (*function).clone();
             return Some(Function { parameters, body, span });
         }
         for (_, function) in found {
             faults.push(
-                Fault::new(format!("`{name}` must have {count} parameters, but it has {}", function.parameters.len()))
-                    .hint(format!("write: fn {form}"))
-                    .at(function.span.clone()),
+                Fault::new(format!(
+                    "`{name}` must have {} parameters, but it has {}",
+                    counts.iter().map(ToString::to_string).collect::<Vec<_>>().join(" or "),
+                    function.parameters.len()
+                ))
+                .hint(format!("write: fn {form}"))
+                .at(function.span.clone()),
             );
         }
         None
     }
 
-    /// The name under which the function table has the script's own `surface`.
-    pub fn surface_key(&self) -> Option<&(String, usize)> {
-        let mut own = self.functions.iter().filter(|(_, function)| function.file == 0);
-        own.find(|((_, count), function)| function.name == "surface" && *count == 2).map(|(key, _)| key)
+    /// The name under which the function table has one of the script's own functions that the renderer calls.
+    pub fn key(&self, entry: Entry) -> Option<&(String, usize)> {
+        let own = |count: &usize| {
+            let mut own = self.functions.iter().filter(|(_, function)| function.file == 0);
+            own.find(|((_, n), function)| function.name == entry.name() && n == count).map(|(key, _)| key)
+        };
+        entry.counts().iter().find_map(own)
     }
 
     /// Runs one of the functions with its arguments.

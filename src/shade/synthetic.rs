@@ -6,6 +6,8 @@
 //! branches of scripts are taken as often as they would be. Most hits are the camera's; some are mirrored, refracted,
 //! shadow rays, or seen from behind.
 //!
+//! [`pairs`] are lines between such hits, as `line(pair, p)` gets them.
+//!
 //! No hit has attributes, so that `hit.attribute` gives its default.
 //!
 //! The same call gives the same bits on every machine. `tusche shader check` and `bench` run shaders over these hits.
@@ -15,6 +17,8 @@ use std::f32::consts::TAU;
 use super::batch::{HitBatch, LightSample};
 use super::names::PathKind;
 use crate::math::{Vec2, Vec3, Vec4, portable};
+use crate::sample::{NodePath, PairBatch, PairSide};
+use crate::scene::settings::LineType;
 
 /// Lights of the stage.
 pub const LIGHTS: usize = 2;
@@ -45,6 +49,45 @@ pub fn hits(len: usize, seed: u64) -> HitBatch {
     };
     for row in 0..len {
         push(&mut batch, &mut Random::new(seed, row as u64));
+    }
+    batch
+}
+
+/// A batch of `len` lines between neighbouring hits of the stage, some at its rim. Batches of other seeds hold other lines.
+#[must_use]
+pub fn pairs(len: usize, seed: u64) -> PairBatch {
+    let mut batch = PairBatch { len, ..PairBatch::default() };
+    let hits = hits(2 * len, seed);
+    for row in 0..len {
+        let mut random = Random::new(!seed, row as u64);
+        let is_miss = random.next() < 0.2;
+        let same_object = hits.object_id[2 * row] == hits.object_id[2 * row + 1];
+        batch.kind.push(match (is_miss, same_object) {
+            (true, _) => LineType::Outline,
+            (false, false) => LineType::Silhouette,
+            _ => LineType::ALL[2 + (random.next() * (LineType::ALL.len() - 2) as f32) as usize],
+        });
+        batch.path.push(match hits.path_kind[2 * row] {
+            PathKind::Reflection => NodePath::CAMERA.reflected(),
+            PathKind::Refraction => NodePath::CAMERA.refracted(),
+            _ => NodePath::CAMERA,
+        });
+        batch.distance.push(random.next());
+        batch.own.push(random.next() < 0.5);
+        batch.width.push(0.5 + 7.5 * random.next());
+        batch.color.push([random.next(), random.next(), random.next()]);
+        batch.opacity.push(if random.next() < 0.8 { 1.0 } else { random.next() });
+        batch.pixel.push([960.0 * random.next(), 540.0 * random.next()]);
+        for (index, side) in batch.sides.iter_mut().enumerate() {
+            let hit = 2 * row + index;
+            let is_miss = is_miss && index == 1;
+            side.object.push(if is_miss { 0 } else { hits.object_id[hit] });
+            side.material.push(if is_miss { 0 } else { hits.material_id });
+            side.depth.push(if is_miss { PairSide::FARTHEST } else { hits.depth[hit] });
+            side.position.push(if is_miss { [0.0; 3] } else { hits.position[hit].to_array() });
+            side.normal.push(if is_miss { [0.0, 0.0, 1.0] } else { hits.normal[hit].to_array() });
+            side.feature.push(if is_miss { [0.0; 3] } else { hits.color[hit].truncate().to_array() });
+        }
     }
     batch
 }
@@ -279,6 +322,20 @@ mod tests {
             assert!(visibilities.contains(&0.0) && visibilities.contains(&1.0), "light {light} casts shadows");
         }
         assert!(lights.iter().any(|light| light.visibility == 0.5));
+    }
+
+    #[test]
+    fn lines_are_of_every_kind_and_agree_with_themselves() {
+        let pairs = pairs(512, 1);
+        for kind in LineType::ALL {
+            assert!(pairs.kind.contains(&kind), "{kind:?}");
+        }
+        for row in 0..pairs.len {
+            let [own, other] = pairs.sides.each_ref().map(|side| side.object[row]);
+            assert!(own > 0 && (other == 0) == (pairs.kind[row] == LineType::Outline));
+            assert_eq!(pairs.sides[1].depth[row] == PairSide::FARTHEST, other == 0);
+            assert!((0.0..1.0).contains(&pairs.distance[row]) && (0.0..=1.0).contains(&pairs.opacity[row]));
+        }
     }
 
     #[test]

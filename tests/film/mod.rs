@@ -116,7 +116,7 @@ impl Samples {
             .enumerate()
             .filter_map(|(sample, &(x, y, s))| Some((sample as u32, (self.line)(x, y, s)?)))
             .unzip();
-        (buffer, LineBuffer { rect, samples, lines, counts: LineCounts::default() })
+        (buffer, LineBuffer { rect, samples, lines, counts: LineCounts::default(), gate: Vec::new() })
     }
 
     /// The whole picture in tiles.

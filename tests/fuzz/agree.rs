@@ -5,14 +5,17 @@ use std::sync::Arc;
 
 use tusche::diag::{Diagnostics, Source};
 use tusche::math::{Affine2, DVec3, Vec2, Vec3, Vec4};
+use tusche::sample::{NodePath, PairBatch};
 use tusche::scene::camera::{Camera, Projection};
 use tusche::scene::ids::{MaterialId, TextureId};
 use tusche::scene::light::{Light, LightKind};
 use tusche::scene::material::{Material, ParamValue, Script};
+use tusche::scene::settings::LineType;
 use tusche::scene::texture::{Image, Pixels, Texture, TextureFilter, TextureRef, Wrap};
 use tusche::scene::{Scene, SceneBuilder};
 use tusche::shade::{
-    HitBatch, Host, LightSample, Mode, OutputBatch, OutputSet, PathKind, ShadeErrors, Shaders, Shading, ShadingMode,
+    HitBatch, Host, LightSample, LineStyles, Mode, OutputBatch, OutputSet, PathKind, ShadeErrors, Shaders, Shading,
+    ShadingMode,
 };
 
 /// What became of a script.
@@ -59,6 +62,38 @@ pub fn compare(script: &str, hits: &HitBatch, wanted: OutputSet) -> Result<Verdi
         return Err(format!("errors differ:\nkernel:\n{errors_a}\ninterpreter:\n{errors_b}"));
     }
     match difference(&a, &b) {
+        Some(what) => Err(what),
+        None => Ok(Verdict::Agrees),
+    }
+}
+
+/// The same for a script's `line`.
+///
+/// # Errors
+/// What differs.
+pub fn compare_lines(script: &str, pairs: &PairBatch) -> Result<Verdict, String> {
+    let scene = scene(script);
+    let kernels = Shaders::compile(&scene, &Host::new());
+    let reference = Shaders::compile_for(&scene, &Host::new(), ShadingMode::Interpreter);
+    let (kernels, reference) = match (kernels, reference) {
+        (Ok((kernels, _)), Ok((reference, _))) => (kernels, reference),
+        (Err(a), Err(b)) if rendered(&a) == rendered(&b) => return Ok(Verdict::Refused(rendered(&a))),
+        (a, b) => return Err(format!("one compiles: {:?}\n{:?}", a.err(), b.err())),
+    };
+    let shader = kernels.of(MaterialId(0));
+    if let Some(blame) = shader.line_blame() {
+        return Ok(Verdict::Interpreted(blame.message));
+    }
+    let shade = |shaders: &Shaders| {
+        let (mut styles, mut errors) = (LineStyles::default(), ShadeErrors::default());
+        Shading::new(&scene, shaders).style(MaterialId(0), pairs, &mut styles, &mut errors);
+        (styles, rendered(&errors.into_diagnostics()))
+    };
+    let ((a, errors_a), (b, errors_b)) = (shade(&kernels), shade(&reference));
+    if errors_a != errors_b {
+        return Err(format!("errors differ:\nkernel:\n{errors_a}\ninterpreter:\n{errors_b}"));
+    }
+    match column("color", &a.color, &b.color).or_else(|| column("opacity", &a.opacity, &b.opacity)) {
         Some(what) => Err(what),
         None => Ok(Verdict::Agrees),
     }
@@ -234,6 +269,31 @@ pub fn hits(len: usize, random: &mut Random) -> HitBatch {
         batch.uv_footprint.push(random.float());
         let lights = [random.light(), random.light()];
         batch.lights.extend(lights);
+    }
+    batch
+}
+
+/// Lines with every column filled.
+pub fn pairs(len: usize, random: &mut Random) -> PairBatch {
+    let mut batch = PairBatch { len, ..PairBatch::default() };
+    let paths = [NodePath::CAMERA, NodePath::CAMERA.reflected(), NodePath::CAMERA.refracted()];
+    for _ in 0..len {
+        batch.kind.push(LineType::ALL[random.next() as usize % LineType::ALL.len()]);
+        batch.path.push(paths[random.next() as usize % paths.len()]);
+        batch.distance.push(random.float());
+        batch.own.push(random.next().is_multiple_of(2));
+        batch.width.push(random.float());
+        batch.color.push(random.vec3().to_array());
+        batch.opacity.push(random.float());
+        batch.pixel.push([random.float(), random.float()]);
+        for side in &mut batch.sides {
+            side.object.push((random.next() % 7) as u32);
+            side.material.push((random.next() % 3) as u32);
+            side.depth.push(random.float());
+            side.position.push(random.vec3().to_array());
+            side.normal.push(random.vec3().to_array());
+            side.feature.push(random.vec3().to_array());
+        }
     }
     batch
 }

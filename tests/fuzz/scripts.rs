@@ -67,6 +67,55 @@ pub fn script(choices: &[u8]) -> String {
     writer.script()
 }
 
+/// What scripts say of hits, and what of lines instead. Longer words come first.
+const OF_LINES: [(&str, &str); 36] = [
+    ("fn surface(hit, p)", "fn line(pair, p)"),
+    ("hit.light_count", "3"),
+    ("hit.light(", "lamp("),
+    ("hit.texture(p.map)", "texture(p.map, pair.pixel)"),
+    ("hit.attribute(\"wear\", 0.25)", "pair.opacity"),
+    ("hit.uv_footprint", "pair.distance"),
+    ("hit.uv", "pair.pixel"),
+    ("hit.footprint", "pair.distance"),
+    ("hit.distance", "pair.distance"),
+    ("hit.curvature", "pair.width"),
+    ("hit.time", "pair.opacity"),
+    ("hit.pixels_per_unit", "pair.other.depth"),
+    ("hit.depth", "pair.depth"),
+    ("hit.object_id", "pair.object_id"),
+    ("hit.polygon_id", "pair.other.object_id"),
+    ("hit.material_id", "pair.other.material_id"),
+    ("hit.front_facing", "pair.own"),
+    ("hit.path_kind == \"camera\"", "pair.kind == \"crease\""),
+    ("hit.path_kind", "pair.path_kind"),
+    ("hit.normal", "pair.normal"),
+    ("hit.position", "pair.other.position"),
+    ("hit.irradiance", "pair.color"),
+    ("hit.incoming", "pair.other.normal"),
+    ("hit.tangent", "vec4(pair.feature, 1.0)"),
+    ("hit.color", "vec4(pair.other.feature, 0.5)"),
+    ("line_width", "opacity"),
+    ("line_color", "color"),
+    ("base_color", "color"),
+    ("emission", "color"),
+    ("o.priority", "o.opacity"),
+    ("out.roughness", "out.opacity"),
+    ("out.metallic", "out.opacity"),
+    ("out.specular", "out.opacity"),
+    ("out.aov_one", "out.opacity"),
+    ("\"feature\"", "\"color\""),
+    ("\"aov_two\"", "\"color\""),
+];
+
+/// The script that these choices spell, as one that styles lines.
+#[must_use]
+pub fn line_script(choices: &[u8]) -> String {
+    let text = OF_LINES.iter().fold(script(choices), |text, (of_hits, of_lines)| text.replace(of_hits, of_lines));
+    let head = "fn surface(hit, p) { #{} }\n\
+        fn lamp(i) { #{ direction: vec3(0.25 * i, 1, 0), radiance: vec3(i, 0.5, 2), visibility: 0.75 } }\n";
+    format!("{head}{text}")
+}
+
 impl Writer<'_> {
     fn choose(&mut self, count: usize) -> usize {
         self.choices.next().map_or(0, |byte| usize::from(*byte) % count)
@@ -390,7 +439,8 @@ impl Writer<'_> {
         match self.choose(5) {
             0 => {
                 let (width, color) = (self.expression(Type::Float, 1), self.expression(Type::Vec3, 1));
-                format!("#{{ line_width: {width}, base_color: {color}, priority: {} }}", self.expression(Type::Int, 1))
+                let priority = self.expression(Type::Int, 1);
+                format!("let o = #{{ line_width: {width}, base_color: {color} }}; o.priority = {priority}; o")
             }
             1 => {
                 let (condition, width) = (self.expression(Type::Bool, 1), self.expression(Type::Number, 1));

@@ -57,6 +57,14 @@ const BODIES: &[(&str, &str)] = &[
     ),
     ("indices out of range", "let a = [1, 2, 3]; #{ line_width: a[hit.object_id] }"),
     ("ints that overflow", "let x = 9223372036854775000 + hit.object_id * 300; #{ line_width: x % 7 }"),
+    (
+        "a variable whose type changes over and over",
+        "let x = 0; for i in 0..60 { if hit.front_facing { if hit.polygon_id > i { x = i; } } else { if hit.object_id > i { x = true; } else { x = 0.5; } } } #{ line_width: if x == true { 2.0 } else if x == 0.5 { 3.0 } else { 1.0 } }",
+    ),
+    (
+        "NaN beside an int",
+        "let n = hit.depth * 0.0 / 0.0; #{ aov_a: max(n, 2), aov_b: max(2, n), aov_c: min(n, 2), aov_d: min(2, n), aov_e: step(n, 2), aov_f: pow(n, 0) }",
+    ),
     ("ints divided by zero", "#{ line_width: 12 / hit.object_id, aov_m: mod(7, hit.object_id - 2) }"),
     ("floats that do not fit ints", "#{ line_width: to_int(hit.depth) % 5 }"),
     ("a light that is not there", "#{ line_width: hit.light(hit.object_id).visibility }"),

@@ -4,6 +4,7 @@ mod area;
 mod bad_input;
 mod baselines;
 mod buffer;
+mod convergence;
 mod equal;
 mod objects;
 mod overlap;

@@ -23,7 +23,11 @@
 //!               "range": [2.0, 2.8] | null,       least and greatest value of any channel, where known
 //!               "constant": 2.0 | [1.0, 0.5, 0.0] | null } ],
 //!           "parameters": [ { "name": "ink_width", "value": 2.0 } ],        by name; a texture is { "texture": 0 }
-//!           "max_line_width": 8.0 | null } } ],   what the script declares
+//!           "max_line_width": 8.0 | null,         what the script declares
+//!           "line": null |                        null without a function `line`
+//!             { "mode": "kernel" | "interpreted",
+//!               "blame": null | { as in "diagnostics" },
+//!               "inputs": ["kind", "depth"] } } } ],   what is read on `pair`, of either side
 //!   "errors": 1,
 //!   "warnings": 0 }
 //! ```
@@ -84,6 +88,14 @@ struct Facts {
     outputs: Vec<Output>,
     parameters: Vec<Parameter>,
     max_line_width: Option<f32>,
+    line: Option<LineFacts>,
+}
+
+#[derive(Serialize)]
+struct LineFacts {
+    mode: &'static str,
+    blame: Option<Entry>,
+    inputs: Vec<&'static str>,
 }
 
 #[derive(Serialize)]
@@ -179,6 +191,11 @@ impl Facts {
                 .map(|(name, value)| Parameter { name: name.clone(), value: json(value) })
                 .collect(),
             max_line_width: report.params.max_line_width(),
+            line: report.line.as_ref().map(|line| LineFacts {
+                mode: line.mode.name(),
+                blame: line.blame.as_ref().map(Entry::new),
+                inputs: line.reads.clone(),
+            }),
         }
     }
 }

@@ -9,7 +9,7 @@ use super::inputs;
 use super::interval::Interval;
 use super::nearest_hint;
 use super::operators;
-use super::value::{Abstract, Field, Record, Shape, Vector};
+use super::value::{Abstract, Field, KeysOf, Record, Shape, Vector};
 use super::walk::{Flow, Stop, Walker};
 use crate::shade::names::InputSet;
 
@@ -178,7 +178,7 @@ impl Walker<'_> {
 
     /// A record with the keys of `a` and `b`; a key of both has the value of `b`.
     pub(super) fn merged(&mut self, a: &Record, b: &Record) -> Abstract {
-        let mut merged = Record { is_params: false, ..a.clone() };
+        let mut merged = Record { keys_of: KeysOf::Script, ..a.clone() };
         for (key, new) in &b.fields {
             let field = match a.fields.get(key) {
                 Some(old) if !new.always => Field {
@@ -264,7 +264,7 @@ impl Walker<'_> {
     }
 
     fn key(&mut self, record: &Record, name: &str, position: Position) -> Abstract {
-        if record.is_params {
+        if record.keys_of == KeysOf::Parameters {
             self.parameters.insert(name.into());
         }
         match record.fields.get(name) {
@@ -274,14 +274,16 @@ impl Walker<'_> {
                 self.join_values(&field.value, &absent, field.presence)
             }
             None => {
-                if record.is_params {
-                    let message = format!("there is no parameter `{name}`");
-                    if record.fields.is_empty() {
-                        let hint = Some(format!("declare it: fn params() {{ #{{ {name}: 1.0 }} }}"));
-                        self.find_fault(position, message, hint);
-                    } else {
-                        self.unknown_name(message, name, record.fields.keys().map(|key| &**key), position);
-                    }
+                let message = match record.keys_of {
+                    KeysOf::Script => return self.unit(),
+                    KeysOf::Parameters => format!("there is no parameter `{name}`"),
+                    KeysOf::Pair => format!("there is no `{name}` on `pair`"),
+                };
+                if record.fields.is_empty() {
+                    let hint = Some(format!("declare it: fn params() {{ #{{ {name}: 1.0 }} }}"));
+                    self.find_fault(position, message, hint);
+                } else {
+                    self.unknown_name(message, name, record.fields.keys().map(|key| &**key), position);
                 }
                 self.unit()
             }

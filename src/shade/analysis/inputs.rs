@@ -8,13 +8,13 @@ use std::rc::Rc;
 use rhai::Position;
 
 use super::interval::Interval;
-use super::value::{Abstract, Field, NOWHERE, Record, Shape, Vector};
+use super::value::{Abstract, Field, KeysOf, NOWHERE, Record, Shape, Vector};
 use super::walk::{Flow, Stop, Walker};
 use crate::math::{Affine2, Vec2, Vec3, Vec4};
 use crate::scene::texture::{TextureFilter, TextureRef};
 use crate::shade::fault::Fault;
 use crate::shade::library::{ATTRIBUTE_TYPES, mistyped_attribute, texture_of, unwritten_path};
-use crate::shade::names::InputSet;
+use crate::shade::names::{InputSet, OTHER, PAIR_INPUTS, PairForm};
 use crate::shade::params::Value;
 
 /// The greatest magnitude of an input. Its square is still a finite `f32`.
@@ -54,6 +54,35 @@ pub(super) fn shape(input: InputSet) -> Shape {
         InputSet::IRRADIANCE => vector(positive, 3),
         _ => Shape::Float(any),
     }
+}
+
+/// What `line` gets. It is taken to depend on everything.
+pub(super) fn pair(walker: &mut Walker) -> Abstract {
+    let mut side = |other: bool| {
+        let mut record = Record { keys_of: KeysOf::Pair, ..Record::default() };
+        for input in PAIR_INPUTS.iter().filter(|input| input.of_side || !other) {
+            let channel = |bounds: Option<[f32; 2]>| match bounds {
+                Some([low, high]) => Interval::new(low, high),
+                None => Interval::within(LIMIT),
+            };
+            let shape = match input.form {
+                PairForm::Bool => Shape::Bool(None),
+                PairForm::Int => Shape::Int(0, i64::from(u32::MAX)),
+                PairForm::Word(_) => Shape::Text(None),
+                PairForm::Floats(1, bounds) => Shape::Float(channel(bounds)),
+                PairForm::Floats(count, bounds) => {
+                    Shape::Vector(Vector::new(std::iter::repeat_n(channel(bounds), count.into())))
+                }
+            };
+            let value = walker.value(shape, InputSet::all());
+            record.fields.insert(input.name.into(), Field::always(value, NOWHERE));
+        }
+        record
+    };
+    let (mut pair, other) = (side(false), side(true));
+    let other = walker.value(Shape::Record(Rc::new(other)), InputSet::all());
+    pair.fields.insert(OTHER.into(), Field::always(other, NOWHERE));
+    walker.value(Shape::Record(Rc::new(pair)), InputSet::all())
 }
 
 /// Any value of a type that attributes can have.

@@ -35,12 +35,12 @@ use std::fmt;
 use std::rc::Rc;
 use std::sync::Arc;
 
-use self::value::{Abstract, Field, NOWHERE, Place, Record, Shape};
+use self::value::{Abstract, Field, KeysOf, NOWHERE, Place, Record, Shape};
 use self::walk::{Flow, Walker};
 use super::link;
-use super::names::{AOV_PREFIX, InputSet, OutputSet};
+use super::names::{AOV_PREFIX, InputSet, OutputSet, line_outputs};
 use super::params::{Params, Value};
-use super::script::{Functions, Program};
+use super::script::{Entry, Functions, Program};
 use crate::diag;
 use crate::scene::attributes::AttributeSet;
 use crate::scene::texture::Texture;
@@ -99,33 +99,36 @@ pub struct Analysis {
 #[must_use]
 pub fn analyse(ast: &rhai::AST, params: &Params, textures: &[Arc<Texture>]) -> Analysis {
     let functions = link::functions(ast);
-    analyse_functions(&functions, Some(&("surface".to_owned(), 2)), params, textures, &[])
+    analyse_functions(&functions, Entry::Surface, Some(&("surface".to_owned(), 2)), params, textures, &[])
 }
 
-/// The same for a program.
+/// The same for a program, and for each of its functions that the renderer calls. What is said of inputs is of those of
+/// hits, and means nothing of `line`.
 /// `attributes` are the sets that hits of the material can have.
 pub(super) fn analyse_program(
     program: &Program,
+    entry: Entry,
     params: &Params,
     textures: &[Arc<Texture>],
     attributes: &[&AttributeSet],
 ) -> Analysis {
-    analyse_functions(&program.functions, program.surface_key(), params, textures, attributes)
+    analyse_functions(&program.functions, entry, program.key(entry), params, textures, attributes)
 }
 
 fn analyse_functions(
     functions: &Functions,
-    surface: Option<&(String, usize)>,
+    entry: Entry,
+    key: Option<&(String, usize)>,
     params: &Params,
     textures: &[Arc<Texture>],
     attributes: &[&AttributeSet],
 ) -> Analysis {
     let mut walker = Walker::new(functions, textures, attributes);
-    match walk_surface(&mut walker, surface, params) {
+    match walk_entry(&mut walker, entry, key, params) {
         Ok(Some(record)) => {
             let mut analysis = Analysis::empty(walker.inputs);
             for (key, field) in &record.fields {
-                analysis.add(key, field, &mut walker);
+                analysis.add(entry, key, field, &mut walker);
             }
             analysis.aovs.sort_by(|a, b| a.0.cmp(&b.0));
             analysis.parameters = walker.parameters.iter().map(|name| (**name).to_owned()).collect();
@@ -155,20 +158,29 @@ pub fn unknown() -> Analysis {
     }
 }
 
-/// The record that `surface` returns; `None` if it never returns.
-fn walk_surface(walker: &mut Walker, surface: Option<&(String, usize)>, params: &Params) -> Flow<Option<Rc<Record>>> {
+/// The record that is returned; `None` if none ever is.
+fn walk_entry(
+    walker: &mut Walker,
+    entry: Entry,
+    key: Option<&(String, usize)>,
+    params: &Params,
+) -> Flow<Option<Rc<Record>>> {
     let start = rhai::Position::NONE;
-    let Some(function) = surface.and_then(|(name, count)| walker.script_function(name, *count)) else {
-        return walker.give_up(start, "a script without `surface(hit, p)`");
+    let Some(function) = key.and_then(|(name, count)| walker.script_function(name, *count)) else {
+        return walker.give_up(start, &format!("a script without `{}`", entry.form()));
     };
-    let mut fields = Record { is_params: true, ..Record::default() };
+    let mut fields = Record { keys_of: KeysOf::Parameters, ..Record::default() };
     for (name, value) in params.0.iter() {
         let shape = Shape::from_value(value, walker.textures.len(), &mut || walker.fresh());
         let value = Abstract::constant(shape, walker.fresh());
         fields.fields.insert(name.as_str().into(), Field::always(value, NOWHERE));
     }
     let parameters = Abstract::constant(Shape::Record(Rc::new(fields)), walker.fresh());
-    let arguments = vec![walker.constant(Shape::Hit), parameters];
+    let first = match entry {
+        Entry::Surface => walker.constant(Shape::Hit),
+        Entry::Line => inputs::pair(walker),
+    };
+    let arguments = [first, parameters].into_iter().take(function.parameters.len()).collect();
     let returned = match walker.script_call(function, arguments, None, start) {
         Ok((value, _)) => value,
         Err(walk::Stop::Left) => return Ok(None),
@@ -178,7 +190,8 @@ fn walk_surface(walker: &mut Walker, surface: Option<&(String, usize)>, params: 
         Shape::Record(record) => Ok(Some(record)),
         _ => {
             let end = function.body.last().map_or(start, rhai::Stmt::position);
-            walker.give_up(end, "what `surface` returns, which is not always a record with known keys,")
+            let what = format!("what `{}` returns, which is not always a record with known keys,", entry.name());
+            walker.give_up(end, &what)
         }
     }
 }
@@ -213,7 +226,15 @@ impl Analysis {
     }
 
     /// Takes in a key of the returned record.
-    fn add(&mut self, key: &str, field: &Field, walker: &mut Walker) {
+    fn add(&mut self, entry: Entry, key: &str, field: &Field, walker: &mut Walker) {
+        if entry == Entry::Line && !line_outputs().any(|known| known == key) {
+            let names: Vec<_> = line_outputs().map(|name| format!("`{name}`")).collect();
+            let hint = nearest_hint(key, line_outputs())
+                .unwrap_or_else(|| format!("it gives {}; all else is decided by `surface`", names.join(" and ")));
+            let message = format!("`{}` gives no `{key}`", entry.name());
+            walker.findings.insert(Finding::new(field.place, message, Some(hint)));
+            return;
+        }
         if let Some(name) = key.strip_prefix(AOV_PREFIX) {
             self.aovs.push((name.to_owned(), fact(field, walker)));
             return;

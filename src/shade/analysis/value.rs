@@ -87,12 +87,24 @@ pub(crate) struct Vector {
     pub length: f32,
 }
 
+/// Whose keys a record has. Of what the renderer gives, an unknown name is a fault.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum KeysOf {
+    /// The script's own.
+    #[default]
+    Script,
+    /// The material's parameters.
+    Parameters,
+    /// Of what `line` gets.
+    Pair,
+}
+
 /// An object map with known keys.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Record {
     pub fields: BTreeMap<Rc<str>, Field>,
-    /// Whether these are the material's parameters, of which an unknown name is a fault.
-    pub is_params: bool,
+    /// Whose keys these are.
+    pub keys_of: KeysOf,
 }
 
 /// A key that may be in a record.
@@ -162,7 +174,7 @@ impl Shape {
                         (key.as_str().into(), Field::always(value, NOWHERE))
                     })
                     .collect();
-                Self::Record(Rc::new(Record { fields, is_params: false }))
+                Self::Record(Rc::new(Record { fields, keys_of: KeysOf::Script }))
             }
             Value::Array(items) => {
                 let items =
@@ -421,7 +433,7 @@ impl Join<'_> {
             };
             fields.insert(Rc::clone(key), field);
         }
-        Record { fields, is_params: a.is_params && b.is_params }
+        Record { fields, keys_of: if a.keys_of == b.keys_of { a.keys_of } else { KeysOf::Script } }
     }
 }
 

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use rhai::Position;
 
 use super::Finding;
-use super::value::{Abstract, Cell, Identity, Join, Place, Shape};
+use super::value::{Abstract, Cell, Identity, Join, KeysOf, Place, Shape};
 use crate::scene::attributes::AttributeSet;
 use crate::scene::texture::Texture;
 use crate::shade::names::InputSet;
@@ -182,7 +182,7 @@ impl<'a> Walker<'a> {
             self.inputs = InputSet::all();
         }
         if let Shape::Record(record) = &value.shape
-            && record.is_params
+            && record.keys_of == KeysOf::Parameters
         {
             self.parameters.extend(record.fields.keys().cloned());
         }

@@ -16,17 +16,38 @@ const USEFUL_BOUND: f32 = 1024.0;
 pub(super) fn warnings(shader: &Shader, material: &Material, trial: &Trial, cost: Option<f64>) -> Diagnostics {
     let mut warnings = Diagnostics::default();
     nan(shader, trial, &mut warnings);
+    nan_styles(shader, trial, &mut warnings);
     line_width(shader, trial, &mut warnings);
     without_effect(shader, material, &mut warnings);
+    let interpreted = |what: &str, fault: Diagnostic| Diagnostic {
+        severity: Severity::Warning,
+        message: format!("{what} is interpreted: {}", fault.message),
+        ..fault
+    };
     if let Some(fault) = shader.blame_diagnostic() {
-        let mut warning = Diagnostic { message: format!("this shader is interpreted: {}", fault.message), ..fault };
-        warning.severity = Severity::Warning;
+        let warning = interpreted("this shader", fault);
         warnings.push(match cost {
             Some(cost) => warning.hint(format!("it costs {cost:.0} ns a hit")),
             None => warning,
         });
     }
+    if let Some(fault) = shader.line_blame() {
+        warnings.push(interpreted("`line`", fault));
+    }
     warnings
+}
+
+/// Colours and opacities of lines that are no numbers.
+fn nan_styles(shader: &Shader, trial: &Trial, warnings: &mut Diagnostics) {
+    let colors = trial.styles.color.iter().flatten().filter(|color| color.is_nan()).count();
+    let opacities = trial.styles.opacity.iter().filter(|opacity| opacity.is_nan()).count();
+    for (key, count) in [("color", colors), ("opacity", opacities)].into_iter().filter(|(_, count)| *count > 0) {
+        let span = shader.program.line.as_ref().unwrap_or(&shader.program.surface).span.clone();
+        let warning =
+            Diagnostic::warning(format!("the `{key}` of `line` is NaN at {count} of {TRIAL_HITS} trial lines"));
+        warnings
+            .push(warning.at(span).hint("NaN counts as 0: look for 0/0, and for sqrt, ln or pow of negative numbers"));
+    }
 }
 
 /// Where an output's key stands.

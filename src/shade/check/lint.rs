@@ -15,7 +15,7 @@ use crate::shade::fault;
 use crate::shade::library;
 use crate::shade::params::MAX_LINE_WIDTH;
 use crate::shade::program::Shader;
-use crate::shade::script::ScriptFunction;
+use crate::shade::script::{Entry, ScriptFunction};
 
 /// The arguments of `surface`, as every example calls them.
 const HIT: &str = "hit";
@@ -41,15 +41,15 @@ pub(super) fn lint(shader: &Shader) -> Diagnostics {
     }
     let Lint { keys, mut warnings, .. } = lint;
 
-    let surface = program.surface_key().and_then(|key| program.functions.get(key));
+    let surface = program.key(Entry::Surface).and_then(|key| program.functions.get(key));
     if surface.is_some_and(|surface| surface.parameters == [PARAMETERS, HIT]) {
         let message = format!("`surface` gets the hit first: here it is called `{PARAMETERS}`");
         let warning = Diagnostic::warning(message).at(program.surface.span.clone());
         warnings.push(warning.hint(format!("write: fn surface({HIT}, {PARAMETERS})")));
     }
-    // Functions that neither `surface` nor `params` gets to.
+    // Functions that nothing which the renderer calls gets to.
     let mut reached = BTreeSet::new();
-    let from_outside = own().filter(|(_, function)| matches!(function.name.as_str(), "surface" | "params"));
+    let from_outside = own().filter(|(_, function)| matches!(function.name.as_str(), "surface" | "line" | "params"));
     let mut next: Vec<String> = from_outside.map(|((key, _), _)| key.clone()).collect();
     while let Some(name) = next.pop() {
         if reached.insert(name.clone()) {

@@ -22,6 +22,7 @@ pub(crate) use report::input_names;
 use super::batch::OutputBatch;
 use super::fault::OUT_OF_OPERATIONS;
 use super::interpret::{ShadeErrors, Shading};
+use super::line::LineStyles;
 use super::measure;
 use super::names::OutputSet;
 use super::program::{Mode, Shaders};
@@ -116,6 +117,8 @@ struct Trial {
     outputs: OutputBatch,
     /// Names of the extra outputs, in the order of their columns.
     aovs: Vec<String>,
+    /// What its `line`, if there is one, makes of synthetic lines.
+    styles: LineStyles,
     /// How many hits the interpreter was run for.
     interpreted: u64,
 }
@@ -126,6 +129,11 @@ impl Trial {
         let hits = synthetic::hits(TRIAL_HITS, 0);
         let mut shading = Shading::new(scene, shaders);
         shading.shade(material, &hits, OutputSet::all(), &mut outputs, &mut errors);
+        let interpreted = shading.evaluations();
+        let mut styles = LineStyles::default();
+        if shaders.of(material).styles_lines() {
+            shading.style(material, &synthetic::pairs(TRIAL_HITS, 0), &mut styles, &mut errors);
+        }
         let errors = errors.errors.into_values().map(|(fault, count)| match count {
             // A shader that ran out of operations is not run again, so the count says nothing.
             n if n < TRIAL_HITS as u64 && !fault.message.starts_with(OUT_OF_OPERATIONS) => {
@@ -133,12 +141,7 @@ impl Trial {
             }
             _ => fault,
         });
-        Self {
-            errors: Diagnostics(errors.collect()),
-            outputs,
-            aovs: shaders.aovs().to_vec(),
-            interpreted: shading.evaluations(),
-        }
+        Self { errors: Diagnostics(errors.collect()), outputs, aovs: shaders.aovs().to_vec(), styles, interpreted }
     }
 }
 

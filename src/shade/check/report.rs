@@ -5,7 +5,7 @@ use std::fmt;
 use super::TRIAL_HITS;
 use crate::diag::Diagnostic;
 use crate::shade::analysis::{Analysis, OutputFact};
-use crate::shade::names::{AOV_PREFIX, InputSet, OutputSet};
+use crate::shade::names::{AOV_PREFIX, InputSet, OutputSet, PAIR_INPUTS, PairSet};
 use crate::shade::params::{Params, Value};
 use crate::shade::program::{Mode, Shader};
 
@@ -24,6 +24,19 @@ pub struct Report {
     pub analysis: Analysis,
     /// Its parameters, with the values that were set.
     pub params: Params,
+    /// What is known of its `line`, if it has one.
+    pub line: Option<LineReport>,
+}
+
+/// What the renderer makes of a shader's `line(pair, p)`.
+#[derive(Clone, Debug)]
+pub struct LineReport {
+    /// How it is run.
+    pub mode: Mode,
+    /// If it is interpreted: the construct because of which it is.
+    pub blame: Option<Diagnostic>,
+    /// Names of what is read on `pair` (of either side), in the order of the contract.
+    pub reads: Vec<&'static str>,
 }
 
 impl Report {
@@ -35,6 +48,11 @@ impl Report {
             interpreted_hits,
             analysis: shader.analysis().clone(),
             params: shader.params().clone(),
+            line: shader.line_mode().map(|mode| LineReport {
+                mode,
+                blame: shader.line_blame(),
+                reads: names_on_pair(shader.pair_needs()),
+            }),
         }
     }
 
@@ -51,6 +69,10 @@ impl Report {
         let extra = self.analysis.aovs.iter().map(|(name, fact)| (format!("{AOV_PREFIX}{name}"), fact));
         named.filter(|(_, fact)| fact.may).chain(extra.filter(|(_, fact)| fact.may)).collect()
     }
+}
+
+fn names_on_pair(inputs: PairSet) -> Vec<&'static str> {
+    PAIR_INPUTS.iter().filter(|input| inputs.contains(input.input)).map(|input| input.name).collect()
 }
 
 /// Names of inputs, in the order of the contract.
@@ -88,21 +110,25 @@ impl fmt::Display for Report {
             true => inputs.join(" "),
         };
         writeln!(f, "  reads       {reads}")?;
-        if !self.analysis.complete {
-            return writeln!(f, "  writes      all outputs, since the analysis is not complete");
-        }
         let outputs = self.outputs();
-        if outputs.is_empty() {
+        if !self.analysis.complete {
+            writeln!(f, "  writes      all outputs, since the analysis is not complete")?;
+        } else if outputs.is_empty() {
             writeln!(f, "  writes      nothing: every output has its default")?;
         }
         let width = outputs.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
-        for (index, (name, fact)) in outputs.iter().enumerate() {
+        for (index, (name, fact)) in outputs.iter().enumerate().filter(|_| self.analysis.complete) {
             let title = if index == 0 { "writes" } else { "" };
             let unit = if name == "line_width" { " px" } else { "" };
             writeln!(f, "  {title:<11} {name:<width$}  {}", describe(fact, unit))?;
         }
         if let Some(width) = self.params.max_line_width() {
             writeln!(f, "  declares    lines of at most {width} px")?;
+        }
+        if let Some(line) = &self.line {
+            let mode = if line.mode == Mode::Kernel { "kernel" } else { "interpreted, at every line" };
+            let reads = if line.reads.is_empty() { "nothing".to_owned() } else { line.reads.join(" ") };
+            writeln!(f, "  line        {mode}; reads {reads}")?;
         }
         Ok(())
     }

@@ -11,6 +11,8 @@ const MAX_VALUES: usize = 60_000;
 #[derive(Debug)]
 pub(super) struct Builder {
     pub types: Vec<ValueType>,
+    /// Whether some value may be of more types than is reasonable.
+    pub too_many_types: bool,
     open: Vec<OpenBlock>,
 }
 
@@ -23,7 +25,7 @@ struct OpenBlock {
 
 impl Builder {
     pub fn new() -> Self {
-        Self { types: Vec::new(), open: vec![OpenBlock::default()] }
+        Self { types: Vec::new(), too_many_types: false, open: vec![OpenBlock::default()] }
     }
 
     /// Whether the program has grown beyond all measure.

@@ -16,6 +16,7 @@ use smallvec::SmallVec;
 
 use crate::math::{Vec2, Vec3, portable};
 use crate::shade::library::{color, fractal, math, pattern};
+use crate::shade::names::PairSet;
 
 /// A column that one instruction sets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -305,6 +306,12 @@ pub(in crate::shade) enum Column {
     /// An int: which set of attributes the hit has; −1 where the batch has none.
     AttributeSet,
     LightCount,
+    /// An input on `pair`, or on `pair.other`.
+    Pair {
+        input: PairSet,
+        other: bool,
+        kind: Kind,
+    },
 }
 
 impl Column {
@@ -312,6 +319,7 @@ impl Column {
         match self {
             Self::ObjectId | Self::PolygonId | Self::PathKind | Self::AttributeSet | Self::LightCount => Kind::Int,
             Self::FrontFacing => Kind::Bool,
+            Self::Pair { kind, .. } => kind,
             _ => Kind::Float,
         }
     }

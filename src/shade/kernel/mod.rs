@@ -28,9 +28,10 @@ pub(super) use self::run::Registers;
 use self::slice::Runnable;
 use super::analysis::Finding;
 use super::batch::{HitBatch, OutputBatch};
-use super::names::{InputSet, OutputSet};
+use super::names::{InputSet, OutputSet, PairSet};
 use super::params::Params;
-use super::script::Program;
+use super::script::{Entry, Program};
+use crate::sample::PairBatch;
 
 /// A script, lowered for one material.
 #[derive(Debug)]
@@ -38,6 +39,15 @@ pub(super) struct Kernel {
     lowered: Lowered,
     /// Slices that have been asked for, by outputs.
     slices: Mutex<Vec<(OutputSet, Arc<Slice>)>>,
+}
+
+/// What a kernel runs over.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Batch<'a> {
+    /// Without rows where there are pairs.
+    pub hits: &'a HitBatch,
+    /// What a kernel of `line` runs over.
+    pub pairs: Option<&'a PairBatch>,
 }
 
 /// What some outputs need of a kernel.
@@ -49,17 +59,24 @@ pub(super) struct Slice {
     outputs: Vec<(usize, usize)>,
     /// Inputs that the slice reads.
     pub inputs: InputSet,
+    /// What a slice of `line` reads.
+    pub pair_inputs: PairSet,
     /// Whether hits may fail, so that the interpreter may have to run for them.
     pub may_fail: bool,
 }
 
 impl Kernel {
-    /// Lowers the function `surface(hit, p)` of a script for a material with these parameters.
+    /// Lowers a function of a script that the renderer calls, for a material with these parameters.
     ///
     /// # Errors
     /// The construct that cannot be lowered.
-    pub fn new(program: &Program, params: &Params, surroundings: Surroundings<'_>) -> Result<Self, Finding> {
-        let lowered = lower::lower(program, params, surroundings).map_err(|blame| blame.0)?;
+    pub fn new(
+        program: &Program,
+        entry: Entry,
+        params: &Params,
+        surroundings: Surroundings<'_>,
+    ) -> Result<Self, Finding> {
+        let lowered = lower::lower(program, entry, params, surroundings).map_err(|blame| blame.0)?;
         debug_assert_eq!(verify::verify(&lowered), Ok(()), "the lowering made a program that is not well formed");
         Ok(Self { lowered, slices: Mutex::default() })
     }
@@ -91,8 +108,8 @@ impl Kernel {
             }
         }
         let program = slice::cut(&self.lowered.block, &self.lowered.types, &roots);
-        let (inputs, may_fail) = (program.inputs(), program.may_fail());
-        Slice { program, outputs, inputs, may_fail }
+        let (inputs, pair_inputs, may_fail) = (program.inputs(), program.pair_inputs(), program.may_fail());
+        Slice { program, outputs, inputs, pair_inputs, may_fail }
     }
 
     /// Shades a batch into columns. `failed` gets the rows that the interpreter must look at; their columns hold
@@ -100,18 +117,20 @@ impl Kernel {
     pub fn run(
         &self,
         slice: &Slice,
-        hits: &HitBatch,
+        batch: Batch<'_>,
         aovs: &[String],
         registers: &mut Registers,
         outputs: &mut OutputBatch,
         failed: &mut Vec<usize>,
     ) {
         registers.prepare(&slice.program);
+        let Batch { hits, pairs } = batch;
+        let len = pairs.map_or(hits.len, |pairs| pairs.len);
         let mut first = 0;
-        while first < hits.len {
-            let rows = run::CHUNK.min(hits.len - first);
-            let chunk =
-                run::Chunk { hits, textures: &self.lowered.textures, natives: &self.lowered.natives, first, rows };
+        while first < len {
+            let rows = run::CHUNK.min(len - first);
+            let Lowered { textures, natives, .. } = &self.lowered;
+            let chunk = run::Chunk { hits, pairs, textures, natives, first, rows };
             registers.run(&slice.program, self.lowered.fuel, &chunk);
             for (output, root) in &slice.outputs {
                 let output = &self.lowered.outputs[*output];

@@ -13,7 +13,7 @@ use super::ir::{
     Block, Carried, Code, Column, FloatBinary, FloatUnary, Instruction, Item, Kind, Loop, Noise, Operand, Value,
     ValueType,
 };
-use crate::shade::names::InputSet;
+use crate::shade::names::{InputSet, PairSet};
 
 /// A branch whose instructions cost less than this is taken apart.
 const SHORT_BRANCH: u32 = 12;
@@ -485,7 +485,18 @@ impl Runnable {
     /// The inputs that the program reads.
     pub fn inputs(&self) -> InputSet {
         let mut inputs = InputSet::empty();
-        add_inputs(&self.steps, &mut inputs);
+        each_code(&self.steps, &mut |code| inputs |= input(code));
+        inputs
+    }
+
+    /// What is read on `pair`.
+    pub fn pair_inputs(&self) -> PairSet {
+        let mut inputs = PairSet::empty();
+        each_code(&self.steps, &mut |code| {
+            if let Code::Input(Column::Pair { input, .. }, _) = code {
+                inputs |= input;
+            }
+        });
         inputs
     }
 
@@ -507,12 +518,12 @@ fn any_fails(steps: &[Step]) -> bool {
     })
 }
 
-fn add_inputs(steps: &[Step], inputs: &mut InputSet) {
+fn each_code(steps: &[Step], see: &mut impl FnMut(Code)) {
     for step in steps {
         match step {
-            Step::Set { code, .. } => *inputs |= input(*code),
-            Step::If { steps, .. } => add_inputs(steps, inputs),
-            Step::Loop(round) => add_inputs(&round.steps, inputs),
+            Step::Set { code, .. } => see(*code),
+            Step::If { steps, .. } => each_code(steps, see),
+            Step::Loop(round) => each_code(&round.steps, see),
             Step::Fail(_) => {}
         }
     }
@@ -546,6 +557,7 @@ fn input(code: Code) -> InputSet {
             Column::UvFootprint => InputSet::UV_FOOTPRINT,
             Column::AttributeSet => InputSet::ATTRIBUTE,
             Column::LightCount => InputSet::LIGHT_COUNT,
+            Column::Pair { .. } => InputSet::empty(),
         },
         _ => InputSet::empty(),
     }

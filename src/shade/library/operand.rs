@@ -134,6 +134,9 @@ pub(super) fn unary(engine: &mut Engine, name: &'static str, f: fn(f32) -> f32) 
 /// Registers a function of two arguments that works on each component.
 pub(super) fn binary(engine: &mut Engine, name: &'static str, f: fn(f32, f32) -> f32) {
     engine.register_fn(name, move |x: f32, y: f32| f(x, y));
+    // Not left to the general form: Rhai brings a `min` and a `max` of its own for these types, which lose NaN.
+    engine.register_fn(name, move |x: f32, y: i64| f(x, y as f32));
+    engine.register_fn(name, move |x: i64, y: f32| f(x as f32, y));
     engine.register_fn(name, move |x: Dynamic, y: Dynamic| lanewise(name, [x, y], |[x, y]| f(x, y)));
 }
 

@@ -16,4 +16,9 @@ fuzz_target!(|bytes: &[u8]| {
     if let Err(difference) = agree::compare(&script, &hits, OutputSet::all()) {
         panic!("{difference}\n{script}");
     }
+    let script = scripts::line_script(bytes);
+    let lines = agree::pairs(1 + bytes.len() % 33, &mut agree::Random(seed));
+    if let Err(difference) = agree::compare_lines(&script, &lines) {
+        panic!("{difference}\n{script}");
+    }
 });

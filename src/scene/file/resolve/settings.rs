@@ -7,7 +7,7 @@ use crate::diag::Diagnostic;
 use crate::math::Vec3;
 use crate::scene::check::MAX_PIXELS;
 use crate::scene::settings::{
-    Background, Composition, FilterKind, LineOverrides, LineSettings, RayKinds, RenderSettings,
+    Background, Composition, FilterKind, LineOverrides, LineSettings, LineType, RayKinds, RenderSettings, TypeStyle,
 };
 use crate::scene::texture::{Texture, TextureFilter, Wrap};
 
@@ -93,6 +93,7 @@ impl Resolver<'_> {
             let warning = Diagnostic::warning(message).at(node.span_of("width"));
             self.faults.push(warning.hint(format!("set `max_width = {}`, too", lines.width)));
         }
+        let types = self.line_types(lines, node);
         let paths = lines.paths.iter().map(|path| match path {
             format::LinePath::Camera => RayKinds::CAMERA,
             format::LinePath::Reflection => RayKinds::REFLECTION,
@@ -117,7 +118,34 @@ impl Resolver<'_> {
                 format::Compose::Replace => Composition::Replace,
                 format::Compose::Throughput => Composition::Throughput,
             },
+            types,
         };
+    }
+
+    /// In the order of [`LineType::ALL`].
+    fn line_types(&mut self, lines: &format::Lines, node: &Node) -> [TypeStyle; LineType::ALL.len()] {
+        let types = &lines.types;
+        LineType::ALL.map(|kind| {
+            let style = match kind {
+                LineType::Outline => &types.outline,
+                LineType::Silhouette => &types.silhouette,
+                LineType::Overlap => &types.overlap,
+                LineType::Material => &types.material,
+                LineType::Crease => &types.crease,
+                LineType::Uv => &types.uv,
+                LineType::Feature => &types.feature,
+            };
+            if style.width.is_some_and(|width| width > lines.max_width) {
+                let at = node.get("types").and_then(|types| types.get(kind.name())).unwrap_or(node);
+                let message = format!("lines are drawn {} pixels wide, as `max_width` says", lines.max_width);
+                self.faults.push(Diagnostic::warning(message).at(at.span_of("width")));
+            }
+            TypeStyle {
+                color: style.color.map(rgb),
+                width: style.width.map(|width| width as f32),
+                opacity: style.opacity.map(|opacity| opacity as f32),
+            }
+        })
     }
 
     /// What a material changes about the line tests; `path` names it in messages.

@@ -260,7 +260,8 @@ fn claims(bench: &Bench, text: &str) -> Result<Option<(Program, Analysis)>, Stri
         .map_err(|faults| format!("{faults}\n{text}"))?;
     let sets = attribute_sets();
     let attributes: Vec<&AttributeSet> = sets.iter().collect();
-    let found = analyse_program(&program, &bench.params, &bench.textures, &attributes);
+    let found =
+        analyse_program(&program, crate::shade::script::Entry::Surface, &bench.params, &bench.textures, &attributes);
     Ok(found.complete.then_some((program, found)))
 }
 

@@ -14,6 +14,7 @@ use super::{Flow, Lowerer};
 use crate::math::{Affine2, Vec2, Vec3, Vec4};
 use crate::scene::texture::{TextureFilter, TextureRef};
 use crate::shade::library::texture_of;
+use crate::shade::names::PATH_KINDS;
 use crate::shade::native::NativeType;
 use crate::shade::params::Value;
 
@@ -165,7 +166,10 @@ impl Lowerer<'_> {
             "uv_footprint" => (Column::UvFootprint, 1),
             "object_id" => return Ok(Meaning::Int(self.builder.emit(Code::Input(Column::ObjectId, 0), &[]))),
             "polygon_id" => return Ok(Meaning::Int(self.builder.emit(Code::Input(Column::PolygonId, 0), &[]))),
-            "path_kind" => return Ok(Meaning::PathKind(self.builder.emit(Code::Input(Column::PathKind, 0), &[]))),
+            "path_kind" => {
+                let place = self.builder.emit(Code::Input(Column::PathKind, 0), &[]);
+                return Ok(Meaning::Word(place, &PATH_KINDS));
+            }
             "front_facing" => return Ok(Meaning::Bool(self.builder.emit(Code::Input(Column::FrontFacing, 0), &[]))),
             "material_id" | "shader_id" => return Ok(Meaning::int(self.surroundings.material_id.into())),
             "light_count" => return Ok(Meaning::Int(self.light_count())),

@@ -12,11 +12,14 @@ use smallvec::SmallVec;
 use super::super::build::Builder;
 use super::super::ir::{Kind, Operand};
 
+/// Types that one variable may have before its script is no kernel.
+const MOST_CHOICES: usize = 16;
+
 /// The channels of a vector.
 pub(in crate::shade::kernel) type Channels = SmallVec<[Operand; 4]>;
 
 /// What a value is.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub(in crate::shade::kernel) enum Meaning {
     /// Not set on any path so far.
     Undefined,
@@ -26,8 +29,8 @@ pub(in crate::shade::kernel) enum Meaning {
     Float(Operand),
     Vector(Channels),
     Text(Rc<str>),
-    /// `hit.path_kind`: an int that stands for a text.
-    PathKind(Operand),
+    /// A text that differs from hit to hit, as `hit.path_kind`: an int, its place among these.
+    Word(Operand, &'static [&'static str]),
     /// A use of a texture, by number in the scene's list of uses.
     Texture(usize),
     Record(Rc<Record>),
@@ -46,7 +49,7 @@ pub(in crate::shade::kernel) enum Meaning {
 pub(in crate::shade::kernel) type Record = BTreeMap<Rc<str>, Field>;
 
 /// A key of an object map.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub(in crate::shade::kernel) struct Field {
     pub value: Meaning,
     /// Where the key is there at all.
@@ -54,7 +57,7 @@ pub(in crate::shade::kernel) struct Field {
 }
 
 /// `low .. end` or `low ..= end`.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::shade::kernel) struct Range {
     pub low: Operand,
     pub end: Operand,
@@ -62,14 +65,14 @@ pub(in crate::shade::kernel) struct Range {
 }
 
 /// A function without a name, bound to variables around it.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub(in crate::shade::kernel) struct Closure {
     pub function: Rc<str>,
     pub captured: Vec<Captured>,
 }
 
 /// What a closure holds of its surroundings.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub(in crate::shade::kernel) enum Captured {
     /// A variable, shared with the surroundings.
     Variable {
@@ -105,7 +108,7 @@ impl Meaning {
             Self::Int(_) => "int".into(),
             Self::Float(_) => "float".into(),
             Self::Vector(channels) => format!("vec{}", channels.len()),
-            Self::Text(_) | Self::PathKind(_) => "text".into(),
+            Self::Text(_) | Self::Word(..) => "text".into(),
             Self::Texture(_) => "texture".into(),
             Self::Record(_) => "record".into(),
             Self::Array(_) => "array".into(),
@@ -156,14 +159,24 @@ impl Meaning {
         news.then(|| Self::Record(Rc::new(wider)))
     }
 
+    /// Whether [`Builder::join`] makes one value of the two that is no choice at its top.
+    fn joins_into_one_with(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Range(a), Self::Range(b)) => a.inclusive == b.inclusive,
+            (Self::Record(_), Self::Record(_)) => true,
+            (Self::Array(a), Self::Array(b)) => a.len() == b.len(),
+            _ => self.same_form(other),
+        }
+    }
+
     /// Whether two have the same structure, so that one can follow the other in a loop.
     pub fn same_form(&self, other: &Self) -> bool {
         match (self, other) {
             (Self::Vector(a), Self::Vector(b)) => a.len() == b.len(),
+            (Self::Word(_, a), Self::Word(_, b)) => a == b,
             (Self::Bool(_), Self::Bool(_))
             | (Self::Int(_), Self::Int(_))
             | (Self::Float(_), Self::Float(_))
-            | (Self::PathKind(_), Self::PathKind(_))
             | (Self::Light(_), Self::Light(_)) => true,
             (Self::Range(a), Self::Range(b)) => a.inclusive == b.inclusive,
             (Self::Record(a), Self::Record(b)) => {
@@ -184,7 +197,7 @@ impl Meaning {
             Self::Bool(x) => Self::Bool(f(*x)),
             Self::Int(x) => Self::Int(f(*x)),
             Self::Float(x) => Self::Float(f(*x)),
-            Self::PathKind(x) => Self::PathKind(f(*x)),
+            Self::Word(x, words) => Self::Word(f(*x), words),
             Self::Light(x) => Self::Light(f(*x)),
             Self::Vector(channels) => Self::Vector(channels.iter().map(|x| f(*x)).collect()),
             Self::Range(range) => Self::Range(Range { low: f(range.low), end: f(range.end), ..*range }),
@@ -217,7 +230,7 @@ impl Meaning {
 impl Builder {
     /// `a` where the mask is true, else `b`.
     pub fn join(&mut self, mask: Operand, a: &Meaning, b: &Meaning) -> Meaning {
-        use Meaning::{Array, Bool, Choice, Float, Int, Light, PathKind, Range as Span, Record, Undefined, Vector};
+        use Meaning::{Array, Bool, Choice, Float, Int, Light, Range as Span, Record, Undefined, Vector, Word};
         if a == b || mask == Operand::TRUE {
             return a.clone();
         }
@@ -229,7 +242,7 @@ impl Builder {
             (Bool(a), Bool(b)) => Bool(self.select(mask, *a, *b)),
             (Int(a), Int(b)) => Int(self.select(mask, *a, *b)),
             (Float(a), Float(b)) => Float(self.select(mask, *a, *b)),
-            (PathKind(a), PathKind(b)) => PathKind(self.select(mask, *a, *b)),
+            (Word(a, words), Word(b, others)) if words == others => Word(self.select(mask, *a, *b), words),
             (Light(a), Light(b)) => Light(self.select(mask, *a, *b)),
             (Vector(a), Vector(b)) if a.len() == b.len() => {
                 Vector(a.iter().zip(b).map(|(a, b)| self.select(mask, *a, *b)).collect())
@@ -243,7 +256,50 @@ impl Builder {
                 Array(Rc::new(a.iter().zip(b.iter()).map(|(a, b)| self.join(mask, a, b)).collect()))
             }
             (Record(a), Record(b)) => Record(Rc::new(self.join_records(mask, a, b))),
+            (Choice(..), _) | (_, Choice(..)) => self.join_choices(mask, a, b),
             _ => Choice(mask, Rc::new([a.clone(), b.clone()])),
+        }
+    }
+
+    /// Joins values of which one may be of several types. What is of one type on both sides becomes one value: else a
+    /// variable that changes its type in turn would grow with each join, by a factor.
+    fn join_choices(&mut self, mask: Operand, a: &Meaning, b: &Meaning) -> Meaning {
+        let mut all: Vec<(Operand, Meaning)> = Vec::new();
+        let mut add = |builder: &mut Self, at: Operand, value: &Meaning| {
+            let alike = |known: &&mut (Operand, Meaning)| known.1.joins_into_one_with(value);
+            match all.iter_mut().find(alike) {
+                Some((known_at, known)) => {
+                    *known = builder.join(at, value, known);
+                    *known_at = builder.or(*known_at, at);
+                }
+                None => all.push((at, value.clone())),
+            }
+        };
+        let not_mask = self.not(mask);
+        self.each_choice(mask, a, &mut add);
+        self.each_choice(not_mask, b, &mut add);
+        self.too_many_types |= all.len() > MOST_CHOICES;
+        // In one order, so that a loop finds the same form before and after a round.
+        all.sort_by_cached_key(|(_, value)| value.name());
+        let Some((_, mut joined)) = all.pop() else { return Meaning::Undefined };
+        while let Some((at, value)) = all.pop() {
+            joined = Meaning::Choice(at, Rc::new([value, joined]));
+        }
+        joined
+    }
+
+    /// Shows all that a value may be, with where it is that.
+    fn each_choice(&mut self, at: Operand, value: &Meaning, see: &mut impl FnMut(&mut Self, Operand, &Meaning)) {
+        match value {
+            Meaning::Choice(mask, sides) => {
+                let (first, second) = (self.and(at, *mask), self.and_not(at, *mask));
+                self.each_choice(first, &sides[0], see);
+                self.each_choice(second, &sides[1], see);
+            }
+            // Nobody reads it there.
+            Meaning::Undefined => {}
+            _ if at == Operand::FALSE => {}
+            _ => see(self, at, value),
         }
     }
 

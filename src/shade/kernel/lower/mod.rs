@@ -29,15 +29,15 @@ use rhai::Position;
 
 use self::meaning::{Channels, Field, Meaning, Record};
 use super::build::Builder;
-use super::ir::{Block, Code, Comparison, Item, Operand, ValueType};
+use super::ir::{Block, Code, Column, Comparison, Item, Kind, Operand, ValueType};
 use crate::scene::attributes::AttributeSet;
 use crate::scene::texture::{Texture, TextureRef};
 use crate::shade::analysis::Finding;
 use crate::shade::host::{MAX_CALL_DEPTH, MAX_OPERATIONS};
-use crate::shade::names::{AOV_PREFIX, OutputForm, OutputSet};
+use crate::shade::names::{self, AOV_PREFIX, OutputForm, OutputSet, PAIR_INPUTS, PairForm};
 use crate::shade::native::NativeFunction;
 use crate::shade::params::{Params, Value};
-use crate::shade::script::{Functions, Program, ScriptFunction};
+use crate::shade::script::{Entry, Functions, Program, ScriptFunction};
 
 /// Constructs that are walked before a script counts as too long to be a kernel.
 const MAX_STEPS: u32 = 60_000;
@@ -120,7 +120,7 @@ pub(in crate::shade) struct TextureUse {
 pub(super) struct Lowered {
     pub block: Block,
     pub types: Vec<ValueType>,
-    /// What the record that `surface` returns holds.
+    /// What the returned record holds.
     pub outputs: Vec<LoweredOutput>,
     pub textures: Vec<TextureUse>,
     pub natives: Vec<NativeFunction>,
@@ -128,7 +128,7 @@ pub(super) struct Lowered {
     pub fuel: u64,
 }
 
-/// A key of the record that `surface` returns.
+/// A key of the returned record.
 #[derive(Clone, Debug)]
 pub(super) struct LoweredOutput {
     pub target: Target,
@@ -147,8 +147,8 @@ pub(super) enum Target {
     Aov(String),
 }
 
-/// Lowers the function `surface(hit, p)` of a script for a material with these parameters.
-pub(super) fn lower(program: &Program, params: &Params, surroundings: Surroundings<'_>) -> Flow<Lowered> {
+/// Lowers a function of a script that the renderer calls, for a material with these parameters.
+pub(super) fn lower(program: &Program, entry: Entry, params: &Params, surroundings: Surroundings<'_>) -> Flow<Lowered> {
     let functions = &program.functions;
     let mut lowerer = Lowerer {
         builder: Builder::new(),
@@ -163,23 +163,30 @@ pub(super) fn lower(program: &Program, params: &Params, surroundings: Surroundin
         steps: 0,
         next_identity: 0,
     };
-    let surface = program.surface_key().and_then(|key| Some((key.0.as_str(), functions.get(key)?)));
-    let Some((name, function)) = surface else {
-        return Err(lowerer.blame(Position::NONE, "a script without `surface(hit, p)`"));
+    let called = program.key(entry).and_then(|key| Some((key.0.as_str(), functions.get(key)?)));
+    let Some((name, function)) = called else {
+        return Err(lowerer.blame(Position::NONE, &format!("a script without `{}`", entry.form())));
     };
     let record = params.0.iter().map(|(name, value)| {
         (Rc::from(name.as_str()), Field { value: lowerer.parameter(value), present: Operand::TRUE })
     });
     let parameters = Meaning::Parameters(Rc::new(record.collect()));
-    let arguments = vec![Meaning::Hit, parameters];
+    let first = match entry {
+        Entry::Surface => Meaning::Hit,
+        Entry::Line => lowerer.pair(),
+    };
+    let arguments = [first, parameters].into_iter().take(function.parameters.len()).collect();
     let returned = lowerer.call(function, name, arguments, None, Position::NONE)?;
     let end = function.body.last().map_or(Position::NONE, rhai::Stmt::position);
     let record = match returned {
         Meaning::Record(record) => record,
         // Every hit fails or leaves otherwise: there is nothing for a kernel to do.
-        other => return Err(lowerer.blame(end, &format!("that `surface` may return {}", other.name()))),
+        other => {
+            return Err(lowerer.blame(end, &format!("that `{}` may return {}", entry.name(), other.name())));
+        }
     };
-    let outputs = lowerer.outputs(&record, end)?;
+    lowerer.step(end)?;
+    let outputs = lowerer.outputs(entry, &record, end)?;
     let fuel = MAX_OPERATIONS.saturating_sub(lowerer.cost);
     if fuel == 0 {
         return Err(lowerer.blame(Position::NONE, "the sheer number of operations"));
@@ -228,6 +235,9 @@ impl Lowerer<'_> {
         self.cost += 3;
         if self.steps > MAX_STEPS || self.builder.is_full() {
             return self.give_up(position, "a script of this length, with its loops unrolled,");
+        }
+        if self.builder.too_many_types {
+            return self.give_up(position, "a value that may be of so many types");
         }
         Ok(())
     }
@@ -286,15 +296,45 @@ impl Lowerer<'_> {
         Meaning::Texture(self.textures.len() - 1)
     }
 
+    /// What `line` gets: a record of inputs, of which only those that are read stay in the program.
+    fn pair(&mut self) -> Meaning {
+        let mut side = |other: bool| {
+            let inputs = PAIR_INPUTS.iter().filter(|input| input.of_side || !other);
+            let fields = inputs.map(|input| {
+                let mut read = |kind, lane| {
+                    self.builder.emit(Code::Input(Column::Pair { input: input.input, other, kind }, lane), &[])
+                };
+                let value = match input.form {
+                    PairForm::Bool => Meaning::Bool(read(Kind::Bool, 0)),
+                    PairForm::Int => Meaning::Int(read(Kind::Int, 0)),
+                    PairForm::Word(words) => Meaning::Word(read(Kind::Int, 0), words),
+                    PairForm::Floats(1, _) => Meaning::Float(read(Kind::Float, 0)),
+                    PairForm::Floats(count, _) => {
+                        Meaning::Vector((0..count).map(|lane| read(Kind::Float, lane)).collect())
+                    }
+                };
+                (Rc::from(input.name), Field { value, present: Operand::TRUE })
+            });
+            fields.collect::<Record>()
+        };
+        let (mut pair, other) = (side(false), side(true));
+        let other = Field { value: Meaning::Record(Rc::new(other)), present: Operand::TRUE };
+        pair.insert(names::OTHER.into(), other);
+        Meaning::Record(Rc::new(pair))
+    }
+
     // What is returned.
 
-    fn outputs(&mut self, record: &Record, position: Position) -> Flow<Vec<LoweredOutput>> {
+    fn outputs(&mut self, entry: Entry, record: &Record, position: Position) -> Flow<Vec<LoweredOutput>> {
         let mut outputs = Vec::new();
         for (key, field) in record {
+            let of_line = entry == Entry::Line;
             let target = match (OutputSet::spelled(key), key.strip_prefix(AOV_PREFIX)) {
-                (Some(output), _) => Target::Output(output),
-                (None, Some(name)) => Target::Aov(name.to_owned()),
-                (None, None) => return self.give_up(position, &format!("the output `{key}`")),
+                (Some(output), _) if !of_line || names::line_outputs().any(|known| known == &**key) => {
+                    Target::Output(output)
+                }
+                (None, Some(name)) if !of_line => Target::Aov(name.to_owned()),
+                _ => return self.give_up(position, &format!("the output `{key}`")),
             };
             // What is wrong with an output matters where it is there.
             self.live = Some(field.present);

@@ -5,7 +5,6 @@ use rhai::Position;
 use super::super::ir::{BoolBinary, Code, Comparison, FloatBinary, FloatUnary, IntBinary, IntChecked, Operand};
 use super::meaning::{Channels, Meaning, Range};
 use super::{Flow, Lowerer};
-use crate::shade::PathKind;
 
 /// Values that are one of several, taken apart in one operation.
 const MAX_SPREAD: usize = 16;
@@ -161,7 +160,7 @@ impl<'a> Lowerer<'a> {
 
     /// Values of different types are unequal, and in no order.
     fn compare(&mut self, comparison: Comparison, a: &Meaning, b: &Meaning) -> Option<Operand> {
-        use Meaning::{Bool, Float, Int, Light, PathKind as Kind, Text, Texture, Unit, Vector};
+        use Meaning::{Bool, Float, Int, Light, Text, Texture, Unit, Vector, Word};
         let decided = |ordering: std::cmp::Ordering| Operand::Bool(comparison.ints(ordering as i64, 0));
         Some(match (a, b) {
             (Int(a), Int(b)) => self.builder.emit(Code::CompareInts(comparison), &[*a, *b]),
@@ -171,7 +170,7 @@ impl<'a> Lowerer<'a> {
             }
             (Bool(a), Bool(b)) => self.compare_bools(comparison, *a, *b),
             (Text(a), Text(b)) => decided(a.cmp(b)),
-            (Text(_) | Kind(_), Text(_) | Kind(_)) => {
+            (Text(_) | Word(..), Text(_) | Word(..)) => {
                 let equal = self.texts_equal(a, b, Position::NONE).ok()?;
                 match comparison {
                     Comparison::Equal => equal,
@@ -238,18 +237,18 @@ impl<'a> Lowerer<'a> {
         equal
     }
 
-    /// Whether two texts are equal, of which either may be `hit.path_kind`.
+    /// Whether two texts are equal, of which either may differ from hit to hit.
     pub(super) fn texts_equal(&mut self, a: &Meaning, b: &Meaning, position: Position) -> Flow<Operand> {
         match (a, b) {
             (Meaning::Text(a), Meaning::Text(b)) => Ok(Operand::Bool(a == b)),
-            (Meaning::PathKind(a), Meaning::PathKind(b)) => {
+            (Meaning::Word(a, words), Meaning::Word(b, others)) if words == others => {
                 Ok(self.builder.emit(Code::CompareInts(Comparison::Equal), &[*a, *b]))
             }
-            (Meaning::PathKind(kind), Meaning::Text(text)) | (Meaning::Text(text), Meaning::PathKind(kind)) => {
-                match PathKind::ALL.iter().position(|known| known.name() == &**text) {
+            (Meaning::Word(word, words), Meaning::Text(text)) | (Meaning::Text(text), Meaning::Word(word, words)) => {
+                match words.iter().position(|known| *known == &**text) {
                     Some(place) => {
                         let place = Operand::Int(place as i64);
-                        Ok(self.builder.emit(Code::CompareInts(Comparison::Equal), &[*kind, place]))
+                        Ok(self.builder.emit(Code::CompareInts(Comparison::Equal), &[*word, place]))
                     }
                     None => Ok(Operand::FALSE),
                 }

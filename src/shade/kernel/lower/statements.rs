@@ -189,7 +189,7 @@ impl Lowerer<'_> {
                 let differ = self.builder.emit(Code::Bool2(BoolBinary::Xor), &[*a, *b]);
                 Ok(self.builder.not(differ))
             }
-            (Meaning::Text(_) | Meaning::PathKind(_), Meaning::Text(_)) => self.texts_equal(subject, value, position),
+            (Meaning::Text(_) | Meaning::Word(..), Meaning::Text(_)) => self.texts_equal(subject, value, position),
             (Meaning::Float(Operand::Float(a)), Meaning::Float(Operand::Float(b))) => Ok(Operand::Bool(a == b)),
             (Meaning::Float(_), Meaning::Float(_)) => self.give_up(position, "a `switch` on a float"),
             (Meaning::Unit, Meaning::Unit) => Ok(Operand::TRUE),

@@ -6,12 +6,15 @@ use super::bank::{Block, LANES, mask};
 use super::{Chunk, Registers};
 use crate::shade::batch::LightSample;
 use crate::shade::library::hit;
-use crate::shade::names::PathKind;
+use crate::shade::names::{PairSet, PathKind};
 
 impl Registers {
     #[inline(always)]
     pub(super) fn input(&mut self, column: Column, lane: usize, result: Register, chunk: &Chunk<'_>) {
         let hits = chunk.hits;
+        if let Column::Pair { input, other, .. } = column {
+            return self.pair_input(input, other, lane, result, chunk);
+        }
         match column.kind() {
             Kind::Float => {
                 let mut out = self.floats.take(result);
@@ -61,6 +64,45 @@ impl Registers {
         }
     }
 
+    /// An input on `pair` or `pair.other`.
+    #[inline(always)]
+    fn pair_input(&mut self, input: PairSet, other: bool, lane: usize, result: Register, chunk: &Chunk<'_>) {
+        let Some(pairs) = chunk.pairs else { return };
+        let side = &pairs.sides[usize::from(other)];
+        match input {
+            PairSet::OWN => {
+                let mut out = self.bools.take(result);
+                load(&mut out, &pairs.own, chunk, mask);
+                self.bools.put(result, out);
+            }
+            PairSet::KIND | PairSet::PATH_KIND | PairSet::OBJECT_ID | PairSet::MATERIAL_ID => {
+                let mut out = self.ints.take(result);
+                match input {
+                    PairSet::KIND => load(&mut out, &pairs.kind, chunk, |kind| kind as i64),
+                    PairSet::PATH_KIND => load(&mut out, &pairs.path, chunk, |path| PathKind::of(path).place()),
+                    PairSet::OBJECT_ID => load(&mut out, &side.object, chunk, i64::from),
+                    _ => load(&mut out, &side.material, chunk, i64::from),
+                }
+                self.ints.put(result, out);
+            }
+            _ => {
+                let mut out = self.floats.take(result);
+                match input {
+                    PairSet::DISTANCE => load(&mut out, &pairs.distance, chunk, |x| x),
+                    PairSet::WIDTH => load(&mut out, &pairs.width, chunk, |x| x),
+                    PairSet::COLOR => load(&mut out, &pairs.color, chunk, |v| v[lane]),
+                    PairSet::OPACITY => load(&mut out, &pairs.opacity, chunk, |x| x),
+                    PairSet::PIXEL => load(&mut out, &pairs.pixel, chunk, |v| v[lane]),
+                    PairSet::DEPTH => load(&mut out, &side.depth, chunk, |x| x),
+                    PairSet::POSITION => load(&mut out, &side.position, chunk, |v| v[lane]),
+                    PairSet::NORMAL => load(&mut out, &side.normal, chunk, |v| v[lane]),
+                    _ => load(&mut out, &side.feature, chunk, |v| v[lane]),
+                }
+                self.floats.put(result, out);
+            }
+        }
+    }
+
     #[inline(always)]
     pub(super) fn light(&mut self, index: Register, results: &[Register], chunk: &Chunk<'_>) {
         let hits = chunk.hits;
@@ -73,19 +115,31 @@ impl Registers {
         if !lights.is_empty() {
             for block in 0..chunk.blocks() {
                 let index = index_of.block(block);
-                let same = index_of.uniform().map(in_range);
+                let first = block * LANES;
                 let mut columns = [[0.0; LANES]; 7];
-                for lane in 0..LANES {
-                    let row = (block * LANES + lane).min(chunk.rows - 1);
-                    let light = same.unwrap_or_else(|| in_range(index[lane]));
-                    let LightSample { direction, radiance, visibility } = lights[row * count + light];
-                    columns[0][lane] = direction.x;
-                    columns[1][lane] = direction.y;
-                    columns[2][lane] = direction.z;
-                    columns[3][lane] = radiance.x;
-                    columns[4][lane] = radiance.y;
-                    columns[5][lane] = radiance.z;
-                    columns[6][lane] = visibility;
+                let mut set = |lane: usize, light: &LightSample| {
+                    columns[0][lane] = light.direction.x;
+                    columns[1][lane] = light.direction.y;
+                    columns[2][lane] = light.direction.z;
+                    columns[3][lane] = light.radiance.x;
+                    columns[4][lane] = light.radiance.y;
+                    columns[5][lane] = light.radiance.z;
+                    columns[6][lane] = light.visibility;
+                };
+                match (index_of.uniform(), lights.get(first * count..(first + LANES) * count)) {
+                    // Mostly a loop asks for the same light at all hits.
+                    (Some(light), Some(lights)) => {
+                        let light = in_range(light);
+                        for (lane, lights) in lights.chunks_exact(count).enumerate() {
+                            set(lane, &lights[light]);
+                        }
+                    }
+                    _ => {
+                        for lane in 0..LANES {
+                            let row = (first + lane).min(chunk.rows - 1);
+                            set(lane, &lights[row * count + in_range(index[lane])]);
+                        }
+                    }
                 }
                 for (out, column) in outs.iter_mut().zip(columns) {
                     out[block].0 = column;

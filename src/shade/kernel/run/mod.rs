@@ -20,6 +20,7 @@ use self::loops::{Binary, Checked, Rows, Ternary, Unary, compare, each, select, 
 use super::ir::{BoolBinary, Code, FloatUnary, Kind, Noise};
 use super::lower::TextureUse;
 use super::slice::{CarriedRegisters, LoopSteps, Register, Runnable, Step};
+use crate::sample::PairBatch;
 use crate::shade::batch::HitBatch;
 use crate::shade::library::batch::{noise as batch, numeric, transcendental};
 use crate::shade::library::{hash, math};
@@ -56,6 +57,7 @@ impl Default for Registers {
 #[derive(Clone, Copy)]
 pub(super) struct Chunk<'a> {
     pub hits: &'a HitBatch,
+    pub pairs: Option<&'a PairBatch>,
     pub textures: &'a [TextureUse],
     pub natives: &'a [NativeFunction],
     /// First row, and number of rows, at most [`CHUNK`].

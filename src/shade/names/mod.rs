@@ -1,6 +1,13 @@
 //! The names of the contract between scripts and renderer (DESIGN section 4.1): every input and every output.
 
+mod pair;
+
 use bitflags::bitflags;
+
+use crate::sample::NodePath;
+
+pub(super) use self::pair::{KINDS, OTHER, PATH_KINDS, PairForm, line_outputs};
+pub use self::pair::{LINE_OUTPUTS, PAIR_INPUTS, PairInput, PairSet};
 
 bitflags! {
     /// Inputs on `hit`.
@@ -579,24 +586,24 @@ impl PathKind {
     /// All kinds.
     pub const ALL: [Self; 4] = [Self::Camera, Self::Reflection, Self::Refraction, Self::Shadow];
 
+    /// The kind of the last ray of a path.
+    #[must_use]
+    pub fn of(path: NodePath) -> Self {
+        match path.ends_reflected() {
+            None => Self::Camera,
+            Some(true) => Self::Reflection,
+            Some(false) => Self::Refraction,
+        }
+    }
+
     /// Its place in [`Self::ALL`].
     pub(super) fn place(self) -> i64 {
-        match self {
-            Self::Camera => 0,
-            Self::Reflection => 1,
-            Self::Refraction => 2,
-            Self::Shadow => 3,
-        }
+        self as i64
     }
 
     /// As scripts see it.
     #[must_use]
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Camera => "camera",
-            Self::Reflection => "reflection",
-            Self::Refraction => "refraction",
-            Self::Shadow => "shadow",
-        }
+        PATH_KINDS[self as usize]
     }
 }
