@@ -1,7 +1,8 @@
 //! How much sooner the search finds the oracle's lines: `cargo bench --bench line_search -- [OPTIONS] [WIDTH...]`.
 //!
 //! Options: `--any-pair` searches as for a picture without layers by line type, `--no-brute` leaves out the oracle,
-//! `--quick` takes a part of the picture. The oracle is left out where it would take minutes.
+//! `--quick` takes a part of the picture, `--overlap` adds the overlap test, `--materials` gives one material tests of its
+//! own. The oracle is left out where it would take minutes.
 //!
 //! The picture is synthetic (no ray tracer): discs and straight edges at several depths before a background that the
 //! camera misses, one disc with a priority, one domed so that creases are tested too. Most of it is far from any edge.
@@ -16,7 +17,7 @@ use std::time::Instant;
 use picture::{Tiles, layout, sampled};
 use tusche::line::{LineTile, Method, Rules, TileBounds, find_lines};
 use tusche::sample::{Node, NodeColumnSet, PixelRect, SampleLayout};
-use tusche::scene::settings::LineSettings;
+use tusche::scene::settings::{LineOverrides, LineSettings};
 
 const PICTURE: PixelRect = PixelRect { x0: 0, y0: 0, x1: 512, y1: 384 };
 /// A part of it.
@@ -43,7 +44,13 @@ fn main() {
         return;
     }
     let has = |option: &str| arguments.iter().any(|argument| argument == option);
-    let options = Options { any_pair: has("--any-pair"), brute: !has("--no-brute"), quick: has("--quick") };
+    let options = Options {
+        any_pair: has("--any-pair"),
+        brute: !has("--no-brute"),
+        quick: has("--quick"),
+        overlap: has("--overlap"),
+        materials: has("--materials"),
+    };
     let asked: Vec<f32> = arguments.iter().filter_map(|argument| argument.parse().ok()).collect();
     let widths = if asked.is_empty() { vec![1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0] } else { asked };
     println!(
@@ -62,14 +69,23 @@ struct Options {
     any_pair: bool,
     brute: bool,
     quick: bool,
+    overlap: bool,
+    materials: bool,
 }
 
 fn measure(width: f32, samples_per_pixel: u32, options: Options) {
     let settings =
         LineSettings { max_width: width, width, normal: Some(30.0), object: true, shader: true, ..Default::default() };
+    let settings = LineSettings { overlap: options.overlap.then_some(2.0), ..settings };
     let rules = Rules::new(&settings, samples_per_pixel);
+    let own = LineOverrides { normal: Some(Some(10.0)), ..Default::default() };
+    let overrides = if options.materials { &[Default::default(), Default::default(), own][..] } else { &[] };
+    let rules = rules.with_materials(overrides);
     let rules = if options.any_pair { rules.with_any_pair() } else { rules };
-    let layout = SampleLayout { columns: COLUMNS, ..layout(samples_per_pixel, width) };
+    let layout = SampleLayout {
+        columns: NodeColumnSet { overlap: options.overlap, ..COLUMNS },
+        ..layout(samples_per_pixel, width)
+    };
     let node = |at| node(at, width);
     // The same picture at a rate that keeps the number of samples within bounds.
     let picture = if options.quick || samples_per_pixel > 64 { QUARTER } else { PICTURE };
@@ -166,5 +182,8 @@ fn node([x, y]: [f32; 2], width: f32) -> Node {
         let depth = 2000.0 / (y - 200.0);
         seen = Node { object: 9, shader: 8, depth, priority: 0, line_width: width, ..Node::default() };
     }
-    seen
+    // For the overlap test: a unit of depth is as long as 133 pixels are wide, so that the dome is half a ball; the floor
+    // faces the viewer.
+    let position = [x, y, if seen.object == 9 { 0.0 } else { -133.0 * seen.depth.min(1e6) }];
+    Node { position, geometric_normal: seen.normal, footprint: 1.0, ..seen }
 }

@@ -440,7 +440,7 @@ impl Writer<'_> {
             0 => {
                 let (width, color) = (self.expression(Type::Float, 1), self.expression(Type::Vec3, 1));
                 let priority = self.expression(Type::Int, 1);
-                format!("let o = #{{ line_width: {width}, base_color: {color} }}; o.priority = {priority}; o")
+                format!("; let o = #{{ line_width: {width}, base_color: {color} }}; o.priority = {priority}; o")
             }
             1 => {
                 let (condition, width) = (self.expression(Type::Bool, 1), self.expression(Type::Number, 1));

@@ -43,9 +43,9 @@ fn objects_of_a_group_have_no_line_between_them() {
     let (grouped, _) = draw("group = \"car\"", "group = \"car\"", "");
     assert_eq!(at_border(&grouped), [0.0; 2]);
     // Their outline stays, and the object layer still knows them.
-    assert_eq!(grouped.at(3, 16, 8), 1.0, "the upper edge of the left box");
+    assert!(grouped.at(3, 24, 8) > 0.5, "the upper edge of the left box");
     assert_eq!(grouped.channels[4], apart.channels[4], "object ids");
-    assert_eq!([8, 40].map(|x| grouped.at(4, x + 8, 16).to_bits()), [1, 2]);
+    assert_eq!([24, 40].map(|x| grouped.at(4, x, 16).to_bits()), [1, 2]);
     for (left, right) in [("group = \"car\"", "group = \"bus\""), ("group = \"car\"", "")] {
         assert_eq!(draw(left, right, "").0.bits(), apart.bits(), "{left} and {right}");
     }
@@ -102,7 +102,7 @@ fn an_object_without_lines_draws_none_and_hides_none_that_outranks_it() {
     assert_eq!(at_border(&draw("priority = 1\nlines = false", "")), [0.0; 2]);
     // Its outline is gone, the other's is not.
     let half = draw(off, "");
-    assert_eq!([16, 48].map(|x| half.at(3, x, 8)), [0.0, 1.0]);
+    assert_eq!([24, 40].map(|x| half.at(3, x, 8) > 0.5), [false, true]);
     // A script's width does not bring it back.
     let wide = boxes("", &[&format!("{LEFT}\nlines = false")]).replace(
         "[materials.a]\nshader = \"builtin:ink\"",
@@ -203,7 +203,8 @@ fn a_scene_with_all_of_it_is_brute_force_bit_by_bit() {
         render_with(&scene, &layers, &options).0
     };
     let expected = bits(Method::Brute, 32);
-    assert!(expected.mean(7) > 0.01 && expected.mean(11) > 0.01, "both kinds of lines are there");
+    let kinds = [expected.mean(7), expected.mean(11)];
+    assert!(kinds.iter().all(|mean| *mean > 0.002), "both kinds of lines are there: {kinds:?}");
     for tile in [7, 32] {
         assert!(bits(Method::Exact, tile).bits() == expected.bits(), "tiles of {tile}");
     }
