@@ -5,7 +5,7 @@
 use std::fmt;
 
 use crate::film::{Filter, Layer};
-use crate::line::Rules;
+use crate::line::{LineScript, Rules};
 use crate::sample::{NodeColumnSet, SampleLayout};
 use crate::scene::Scene;
 use crate::scene::ids::MaterialId;
@@ -310,14 +310,21 @@ fn plan_lines(scene: &Scene, shaders: &Shaders, layers: &[Layer]) -> Option<Line
         *id = stand_ins.get(id.index()).copied().unwrap_or(*id);
     }
     let rules = Rules::new(&settings, scene.render().samples).with_widest(widest).with_materials(&overrides);
-    let scripted: Vec<bool> =
-        shaders.iter().zip(&draws).map(|(shader, draws)| *draws && shader.styles_lines()).collect();
-    let rules = rules.with_scripts(&scripted);
+    let scripts: Vec<_> = shaders
+        .iter()
+        .zip(&draws)
+        .map(|(shader, draws)| match (*draws && shader.styles_lines(), shader.changes_line_opacity()) {
+            (false, _) => LineScript::None,
+            (true, false) => LineScript::Color,
+            (true, true) => LineScript::Opacity,
+        })
+        .collect();
+    let rules = rules.with_scripts(&scripts);
     // Only layers by type tell why a line is there.
     let by_type = layers.iter().any(|layer| matches!(layer, Layer::LineType(_)));
     let rules = if by_type { rules } else { rules.with_any_pair() };
     let reach = rules.reach();
-    Some(LinePlan { rules, widest, reach, scripted: scripted.contains(&true), tests })
+    Some(LinePlan { rules, widest, reach, scripted: scripts.iter().any(|script| *script != LineScript::None), tests })
 }
 
 /// What scripts that style lines read on their pairs.

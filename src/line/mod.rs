@@ -30,7 +30,7 @@ pub use bounds::TileBounds;
 pub use differ::Fired;
 pub use inspect::{InspectedPair, TestResult, inspect, nearest_difference};
 pub use rules::Rules;
-pub use style::LineScripts;
+pub use style::{LineScript, LineScripts};
 pub use window::{LineTile, Window};
 
 pub use crate::scene::settings::LineType;

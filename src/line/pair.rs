@@ -4,7 +4,7 @@
 use super::differ::{Features, Fired};
 use super::overlap::Facet;
 use super::window::{PathTile, alpha};
-use super::{LineType, Rules};
+use super::{LineScript, LineType, Rules};
 use crate::sample::NodePath;
 
 /// What orders nodes along the line of sight: explicit priority first, then the shorter depth.
@@ -95,7 +95,7 @@ pub(super) fn is_opaque(
 ) -> bool {
     let (nodes, row) = if own { target } else { neighbor };
     // What a script makes of it is not known yet.
-    !rules.is_scripted(nodes.nodes.shader.get(row))
+    rules.script_of(nodes.nodes.shader.get(row)) != LineScript::Opacity
         && alpha(nodes.nodes, row, type_of(rules, target, neighbor), rules) >= 1.0
 }
 

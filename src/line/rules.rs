@@ -2,6 +2,7 @@
 
 use super::differ::Tests;
 use super::materials::MaterialTests;
+use super::style::LineScript;
 use super::types::TypeRules;
 use crate::math::portable;
 use crate::sample::NodePath;
@@ -19,8 +20,8 @@ pub struct Rules {
     tests: Tests,
     materials: Option<MaterialTests>,
     types: Option<TypeRules>,
-    /// By `shader` value: whose lines a script styles one by one.
-    scripted: Vec<bool>,
+    /// By `shader` value: what scripts change about lines.
+    scripts: Vec<LineScript>,
     exact_pairs: bool,
     hidden: Option<HiddenStyle>,
 }
@@ -59,7 +60,7 @@ impl Rules {
             tests: Tests::new(settings),
             materials: None,
             types: None,
-            scripted: Vec::new(),
+            scripts: Vec::new(),
             exact_pairs: true,
             hidden: None,
             settings: settings.clone(),
@@ -87,11 +88,11 @@ impl Rules {
         self
     }
 
-    /// The same rules, knowing whose lines a script styles one by one, by material id. Such a line may be of any opacity.
+    /// The same rules, knowing what each material's script changes about its lines, by material id.
     #[must_use]
-    pub fn with_scripts(mut self, materials: &[bool]) -> Self {
-        if materials.contains(&true) {
-            self.scripted = std::iter::once(false).chain(materials.iter().copied()).collect();
+    pub fn with_scripts(mut self, materials: &[LineScript]) -> Self {
+        if materials.iter().any(|script| *script != LineScript::None) {
+            self.scripts = std::iter::once(LineScript::None).chain(materials.iter().copied()).collect();
         }
         self
     }
@@ -101,15 +102,15 @@ impl Rules {
         self.types.as_ref()
     }
 
-    /// Whether a script styles the lines of a material, by its `shader` value.
+    /// What a script changes about the lines of a material, by its `shader` value.
     #[inline]
-    pub(super) fn is_scripted(&self, shader: u32) -> bool {
-        self.scripted.get(shader as usize).is_some_and(|scripted| *scripted)
+    pub(super) fn script_of(&self, shader: u32) -> LineScript {
+        self.scripts.get(shader as usize).copied().unwrap_or_default()
     }
 
     /// Whether no script styles any line.
     pub(super) fn no_scripts(&self) -> bool {
-        self.scripted.is_empty()
+        self.scripts.is_empty()
     }
 
     /// The squared radius of the widest line that a node can draw which asks for this one.

@@ -18,6 +18,18 @@ use crate::sample::gate::clean_line_style;
 use crate::sample::{GateCounts, NodeColumns, PairBatch, PairSide};
 use crate::scene::settings::{Composition, TypeStyle};
 
+/// What a material's script changes about its lines, one by one.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum LineScript {
+    /// There is none.
+    #[default]
+    None,
+    /// Their colour.
+    Color,
+    /// Their opacity, and perhaps their colour: what lies behind such a line may be seen through it.
+    Opacity,
+}
+
 /// Scripts that style lines one by one.
 pub trait LineScripts {
     /// Styles lines of a material, given by its `shader` value: for each row of `pairs` a colour, or `None` to leave it, and a
@@ -136,7 +148,7 @@ impl Styler<'_, '_> {
                 let (Some(sides), Some(drawn)) = (self.sides(found, pair), drawn[index].get(layer)) else { continue };
                 let [(nodes, row), _] = sides;
                 let shader = nodes.shader.get(row);
-                if self.rules.is_scripted(shader) {
+                if self.rules.script_of(shader) != LineScript::None {
                     let (batch, places) = batches.entry(shader).or_default();
                     self.add(batch, found, pair, sides, drawn);
                     places.push((index, layer));

@@ -5,7 +5,7 @@ use std::ops::Range;
 use super::bounds::{PathBounds, TileBounds};
 use super::differ::Features;
 use super::pair::{LineNode, Rank};
-use super::{LineType, Rules};
+use super::{LineScript, LineType, Rules};
 use crate::sample::{NodeColumns, NodePath, PixelRect, SampleBuffer};
 use crate::scene::settings::TypeStyle;
 
@@ -192,7 +192,7 @@ pub(super) fn style(nodes: &NodeColumns, row: usize, rules: &Rules) -> LineStyle
         color: nodes.line_color.get(row),
         width: nodes.line_width.get(row),
         opacity: nodes.line_opacity.get(row),
-        scripted: !rules.no_scripts() && rules.is_scripted(nodes.shader.get(row)),
+        scripted: !rules.no_scripts() && rules.script_of(nodes.shader.get(row)) != LineScript::None,
     }
 }
 

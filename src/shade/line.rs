@@ -21,6 +21,8 @@ pub(super) const WRITTEN: OutputSet = OutputSet::COLOR.union(OutputSet::OPACITY)
 /// The `line` of a material's shader.
 #[derive(Debug)]
 pub(super) struct LineShader {
+    /// Whether it may give an opacity.
+    pub opacity: bool,
     /// The kernel, or why there is none; `None` if the interpreter was asked for.
     pub kernel: Option<Result<Arc<Kernel>, Finding>>,
 }

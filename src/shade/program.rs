@@ -160,6 +160,12 @@ impl Shader {
         self.line.is_some()
     }
 
+    /// Whether its `line` may give an opacity: if not, nothing new is seen through its lines.
+    #[must_use]
+    pub fn changes_line_opacity(&self) -> bool {
+        self.line.as_ref().is_some_and(|line| line.opacity)
+    }
+
     /// The columns of a [`PairBatch`](crate::sample::PairBatch) that must be filled for its `line`; none without one.
     #[must_use]
     pub fn pair_needs(&self) -> PairSet {
@@ -275,7 +281,10 @@ impl Shaders {
                         params,
                         program: Arc::clone(program),
                         kernel: None,
-                        line: line.map(|_| LineShader { kernel: None }),
+                        line: line.map(|line| {
+                            let opacity = !line.complete || line.output(OutputSet::OPACITY).may;
+                            LineShader { opacity, kernel: None }
+                        }),
                         other_kernels: Mutex::default(),
                         material_id: MaterialId::from_index(index).0 + 1,
                         light_count: scene.lights().len(),

@@ -80,6 +80,8 @@ fn only_what_is_read_is_asked_for() {
     assert_eq!(needs("#{ color: pair.normal, opacity: pair.distance }"), PairSet::NORMAL | PairSet::DISTANCE);
     // Where it may fail, the interpreter may have to run, which reads all.
     assert_eq!(needs("#{ opacity: 3 / pair.object_id }"), PairSet::all());
+    let opacity = |body: &str| compile(&script(body)).expect("it compiles").of(MaterialId(0)).changes_line_opacity();
+    assert!(!opacity("#{ color: pair.normal }") && opacity("if pair.own { #{ opacity: 0.5 } } else { #{} }"));
     let none = compile("fn surface(hit, p) { #{} }").expect("it compiles");
     assert!(!none.of(MaterialId(0)).styles_lines());
 }

@@ -1,7 +1,7 @@
 //! The search against the oracle, on random samples.
 
 use proptest::prelude::*;
-use tusche::line::{LineBuffer, Method, Rules, SeenLine};
+use tusche::line::{LineBuffer, LineScript, Method, Rules, SeenLine};
 use tusche::math::Vec3;
 use tusche::sample::{HandMadeSample, Node, NodePath, PixelRect, SampleBuffer, SampleColor};
 use tusche::scene::ids::ObjectId;
@@ -26,7 +26,7 @@ struct Case {
     settings: LineSettings,
     overrides: Vec<LineOverrides>,
     /// Materials whose lines a script styles.
-    scripted: Vec<bool>,
+    scripts: Vec<LineScript>,
     samples: Vec<Sample>,
 }
 
@@ -191,9 +191,11 @@ fn case() -> impl Strategy<Value = Case> {
             let palette = proptest::collection::vec(sample(), 1..8);
             let choice = proptest::collection::vec((0..8usize, 1..40usize), count.min(60));
             let offsets = proptest::collection::vec([0.0..1.0f32, 0.0..1.0f32], count);
-            let scripted = few([vec![], vec![], vec![true, false], vec![false, true], vec![true, true]]);
-            (palette, choice, offsets, any::<bool>(), scripted).prop_map(
-                move |(palette, choice, offsets, jitter, scripted)| {
+            let (none, color, opacity) = (LineScript::None, LineScript::Color, LineScript::Opacity);
+            let scripts =
+                few([vec![], vec![], vec![opacity], vec![none, color], vec![opacity, color], vec![opacity, opacity]]);
+            (palette, choice, offsets, any::<bool>(), scripts).prop_map(
+                move |(palette, choice, offsets, jitter, scripts)| {
                     let runs = choice.iter().flat_map(|&(entry, length)| std::iter::repeat_n(entry, length)).cycle();
                     let samples = runs
                         .zip(&offsets)
@@ -203,7 +205,7 @@ fn case() -> impl Strategy<Value = Case> {
                         })
                         .collect();
                     let (settings, overrides) = (settings.clone(), overrides.clone());
-                    Case { rect, samples_per_pixel, tiles, settings, overrides, scripted, samples }
+                    Case { rect, samples_per_pixel, tiles, settings, overrides, scripts, samples }
                 },
             )
         })
@@ -212,10 +214,10 @@ fn case() -> impl Strategy<Value = Case> {
 /// In few words: proptest prints a case as often as it shrinks.
 impl std::fmt::Debug for Case {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Self { rect, samples_per_pixel, tiles, settings, overrides, scripted, samples } = self;
+        let Self { rect, samples_per_pixel, tiles, settings, overrides, scripts, samples } = self;
         writeln!(
             f,
-            "{rect:?}, {samples_per_pixel} samples, tiles of {tiles:?}\n{settings:?}\n{overrides:?}\nscripts: {scripted:?}"
+            "{rect:?}, {samples_per_pixel} samples, tiles of {tiles:?}\n{settings:?}\n{overrides:?}\nscripts: {scripts:?}"
         )?;
         samples.iter().try_for_each(|sample| writeln!(f, "{sample:?}"))
     }
@@ -224,7 +226,7 @@ impl std::fmt::Debug for Case {
 impl Case {
     fn rules(&self) -> Rules {
         let rules = Rules::new(&self.settings, self.samples_per_pixel);
-        rules.with_materials(&self.overrides).with_scripts(&self.scripted)
+        rules.with_materials(&self.overrides).with_scripts(&self.scripts)
     }
 
     fn cut(&self, side: i32, rules: Rules) -> Tiles {

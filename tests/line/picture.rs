@@ -46,6 +46,8 @@ impl LineScripts for AnyScript {
                 (hash ^ u64::from(byte)).wrapping_mul(1_099_511_628_211)
             });
             let opacity = [0.0, 1.0, 0.25, f32::NAN, 2.0, -1.0, 0.5, 0.75][(hash >> 20) as usize % 8];
+            // That of the second material leaves the opacity.
+            let opacity = if shader == 2 { 1.0 } else { opacity };
             let color = [(hash >> 40) as f32, (hash >> 50) as f32, f32::INFINITY];
             styles.push(((hash >> 10).is_multiple_of(3).then_some(color), opacity));
         }

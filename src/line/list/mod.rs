@@ -41,7 +41,7 @@ use super::differ::{Features, Tests};
 use super::overlap::Facet;
 use super::pair::{Pair, Rank};
 use super::window::{PathTile, PathWindow, alpha, features};
-use super::{Fired, LineType, Rules};
+use super::{Fired, LineScript, LineType, Rules};
 use crate::sample::{Column, NodeColumns};
 
 /// Which lines are looked for.
@@ -202,7 +202,7 @@ pub(super) fn is_opaque(
     let (tile, of) = if pair.own { (targets, row) } else { (neighbors, pair.row as usize) };
     let Some((nodes, styling)) = tile.surface(of, pair.surface) else { return true };
     // What a script makes of it is not known yet.
-    if rules.is_scripted(nodes.shader.get(styling)) {
+    if rules.script_of(nodes.shader.get(styling)) == LineScript::Opacity {
         return false;
     }
     let kind = rules.types().and_then(|_| LineType::of(fired(rules, (targets, row), neighbors, pair)?));
