@@ -19,10 +19,9 @@
 //! - A step of height h whose plateaus face the viewer draws if h > τ d, so if it is steeper than atan τ; folds of less
 //!   than τ pixels fade out. τ is the only parameter; 2 is a good start.
 //! - On the very rim of a fold the nearer plane is seen from its edge and passes beside the farther node: b > 0, as for a
-//!   floor and a wall that is seen from its edge, from which one pair alone cannot tell it. Samples there see no line: on a
-//!   smooth rim of radius R before a jump of z those within R d² / 2z² pixels, on a mesh those on the outermost facet, which
-//!   is 2π² R / n² pixels wide with n facets around. Measured: 17 of 833 samples along the folds of a sheet whose facets are
-//!   a pixel long, 4 of 77 on a torus with 64 facets around a tube of 10 pixels, none with 256. All others find the fold.
+//!   floor and a wall that is seen from its edge, from which one pair alone cannot tell it. Samples there see no line of
+//!   this test: on a smooth rim of radius R before a jump of z those within R d² / 2z² pixels of it, on a mesh those on the
+//!   outermost facet, seen nearly from its edge. All others find the fold by neighbours further in.
 //!
 //! In mirrors and glass the same holds with the positions and footprints of what is seen there. Near the focus of a
 //! curved mirror the footprint vanishes, and with it the threshold.

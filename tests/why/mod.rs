@@ -80,7 +80,7 @@ name = "ring"
 shape = "torus"
 segments = 32
 material = "red"
-rotate = [60, 0, 0]
+rotate = [10, 0, 0]
 translate = [2.7, 1.1, 0.0]
 
 [[objects]]
