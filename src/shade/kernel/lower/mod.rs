@@ -6,7 +6,8 @@
 //! 1. `meaning` says what a value is while the script is walked, and joins what two paths give.
 //! 2. Here: variables, calls, and branches. The *live mask* says at which hits control is at the current place; a
 //!    `return`, `break` or `continue` takes hits out of it until the function, loop or round ends.
-//! 3. `statements`, `expressions`, `chains` walk the tree; `operators` and `library` lower what scripts compute.
+//! 3. `statements`, `expressions`, `chains` walk the tree; `operators`, `library` and `inputs` lower what scripts compute
+//!    and read.
 //! 4. `loops` unrolls loops or makes them loops of the program.
 //!
 //! A script that cannot be lowered is run by the interpreter; the [`Blame`] says which construct is at fault.
@@ -16,6 +17,7 @@
 
 mod chains;
 mod expressions;
+mod inputs;
 mod library;
 mod loops;
 pub(super) mod meaning;
