@@ -45,7 +45,7 @@ fn main() {
     let rules = Rules::new(&settings, SAMPLES);
     let bounds = TileBounds::new(&buffer, &rules);
     let tile = LineTile { buffer: &buffer, bounds: &bounds };
-    let lines = find_lines(&Window::single(tile), tile, &rules, Method::Exact);
+    let lines = find_lines(&Window::single(tile), tile, &rules, Method::Exact, None);
 
     let mut lined = vec![0; rect.pixels()];
     for sample in &lines.samples {

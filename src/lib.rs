@@ -11,7 +11,7 @@
 //! 6. [`mod@line`]: image work only; each sample finds the line it sees.
 //! 7. [`film`]: samples are filtered into layers and written as tiles finish.
 //!
-//! [`render`] is the loop over all of it. Nothing but [`cli`] prints; problems are [`diag::Diagnostic`]s.
+//! [`render`] is the loop over all of it; [`study`] measures what comes of it. Nothing but [`cli`] prints; problems are [`diag::Diagnostic`]s.
 
 pub mod cli;
 pub mod clock;
@@ -25,4 +25,5 @@ pub mod render;
 pub mod sample;
 pub mod scene;
 pub mod shade;
+pub mod study;
 pub mod trace;

@@ -9,10 +9,10 @@ use crate::line::Rules;
 use crate::sample::{NodeColumnSet, SampleLayout};
 use crate::scene::Scene;
 use crate::scene::ids::MaterialId;
-use crate::scene::settings::{Background, FilterKind, LineOverrides, LineSettings, RayKinds};
+use crate::scene::settings::{Background, FilterKind, LineOverrides, LineSettings, LineType, RayKinds};
 use crate::shade::analysis::OutputFact;
 use crate::shade::bsdf::MIRROR_ROUGHNESS;
-use crate::shade::{InputSet, Mode, OutputSet, Shader, Shaders};
+use crate::shade::{InputSet, Mode, OutputSet, PairSet, Shader, Shaders};
 
 /// What rendering does with the hits of one material.
 #[derive(Clone, Debug, PartialEq)]
@@ -69,6 +69,8 @@ pub struct LinePlan {
     pub reach: i32,
     /// The settings with the tests that are on for any material that draws lines.
     pub tests: LineSettings,
+    /// Whether scripts style lines one by one.
+    pub scripted: bool,
 }
 
 /// What this scene calls for.
@@ -118,7 +120,9 @@ impl Plan {
         let lines = plan_lines(scene, shaders, layers);
         let surfaces = if lines.is_some() { tests.surfaces } else { 1 };
         let in_play = tests_in_play(scene, &drawing_materials(scene));
-        let wants_feature = in_play.feature.is_some() || layers.contains(&Layer::Feature);
+        let pairs = lines.as_ref().map_or(PairSet::empty(), |_| read_on_pairs(scene, shaders));
+        let wants_feature =
+            in_play.feature.is_some() || layers.contains(&Layer::Feature) || pairs.contains(PairSet::FEATURE);
         for (material, shader) in materials.iter_mut().zip(shaders.iter()) {
             let may = shader.analysis().writable();
             if lines.is_some() {
@@ -133,7 +137,7 @@ impl Plan {
             if surfaces > 1 {
                 let behind = &mut material.behind;
                 behind.wanted = material.wanted & (LINE_OUTPUTS | OutputSet::OPACITY);
-                if in_play.feature.is_some() {
+                if in_play.feature.is_some() || pairs.contains(PairSet::FEATURE) {
                     behind.wanted |= material.wanted & OutputSet::FEATURE;
                 }
                 behind.wanted |= marker(false, true);
@@ -147,12 +151,15 @@ impl Plan {
         let throughput_composition = tests.compose == crate::scene::settings::Composition::Throughput;
         let columns = NodeColumnSet {
             uv: (lines.is_some() && in_play.uv.is_some()) || layers.contains(&Layer::Uv),
-            normal: (lines.is_some() && in_play.normal.is_some()) || layers.contains(&Layer::Normal),
-            feature: (lines.is_some() && in_play.feature.is_some()) || layers.contains(&Layer::Feature),
+            normal: (lines.is_some() && in_play.normal.is_some())
+                || layers.contains(&Layer::Normal)
+                || pairs.contains(PairSet::NORMAL),
+            feature: wants_feature && (lines.is_some() || layers.contains(&Layer::Feature)),
             depth: lines.is_some() || layers.contains(&Layer::Depth),
             lines: lines.is_some(),
             member: layers.contains(&Layer::Object) && !scene.stand_ins().is_empty(),
             overlap: lines.is_some() && in_play.overlap.is_some(),
+            position: pairs.contains(PairSet::POSITION),
             throughput: line_paths && (tests.tint || throughput_composition),
             contribution: lines.is_some() && throughput_composition,
         };
@@ -290,6 +297,8 @@ fn plan_lines(scene: &Scene, shaders: &Shaders, layers: &[Layer]) -> Option<Line
     if widest <= 0.0 {
         return None;
     }
+    let of_types = settings.types.iter().filter_map(|style| style.width);
+    let widest = of_types.fold(widest, f32::max).min(settings.max_width);
     // What draws no lines decides about none.
     let overrides = scene.materials().iter().zip(&draws);
     let overrides: Vec<_> =
@@ -301,11 +310,20 @@ fn plan_lines(scene: &Scene, shaders: &Shaders, layers: &[Layer]) -> Option<Line
         *id = stand_ins.get(id.index()).copied().unwrap_or(*id);
     }
     let rules = Rules::new(&settings, scene.render().samples).with_widest(widest).with_materials(&overrides);
+    let scripted: Vec<bool> =
+        shaders.iter().zip(&draws).map(|(shader, draws)| *draws && shader.styles_lines()).collect();
+    let rules = rules.with_scripts(&scripted);
     // Only layers by type tell why a line is there.
     let by_type = layers.iter().any(|layer| matches!(layer, Layer::LineType(_)));
     let rules = if by_type { rules } else { rules.with_any_pair() };
     let reach = rules.reach();
-    Some(LinePlan { rules, widest, reach, tests })
+    Some(LinePlan { rules, widest, reach, tests, scripted: scripted.contains(&true) })
+}
+
+/// What scripts that style lines read on their pairs.
+fn read_on_pairs(scene: &Scene, shaders: &Shaders) -> PairSet {
+    let draws = drawing_materials(scene);
+    shaders.iter().zip(&draws).filter(|(_, draws)| **draws).map(|(shader, _)| shader.pair_needs()).collect()
 }
 
 /// Which materials are on objects that draw lines.
@@ -396,6 +414,32 @@ fn explain(plan: &Plan, scene: &Scene, shaders: &Shaders) -> String {
         },
     );
     row("lines", explain_lines(plan, scene));
+    if plan.lines.is_some() {
+        let changed = LineType::ALL.into_iter().filter_map(|kind| {
+            let style = scene.lines().types[kind as usize];
+            let parts = [
+                style.width.map(|width| format!("{width} px")),
+                style.opacity.map(|opacity| format!("opacity {opacity}")),
+                style.color.map(|_| "a colour of its own".to_owned()),
+            ];
+            let parts: Vec<_> = parts.into_iter().flatten().collect();
+            (!parts.is_empty()).then(|| format!("{}: {}", kind.name(), parts.join(", ")))
+        });
+        let changed: Vec<_> = changed.collect();
+        if !changed.is_empty() {
+            row("line types", changed.join("; "));
+        }
+    }
+    if plan.lines.as_ref().is_some_and(|lines| lines.scripted) {
+        let draws = drawing_materials(scene);
+        let scripted = shaders.iter().zip(draws).filter(|(_, draws)| *draws).filter_map(|(shader, _)| {
+            let mode = shader.line_mode()?;
+            let reads = flag_names(shader.pair_needs().iter_names().map(|(name, _)| name));
+            let reads = if reads.is_empty() { "nothing".to_owned() } else { reads };
+            Some(format!("those of {} ({}) read {reads}", shader.name(), mode.name()))
+        });
+        row("line scripts", scripted.collect::<Vec<_>>().join("; "));
+    }
     if plan.lines.is_some() && !scene.stand_ins().is_empty() {
         row("groups", explain_groups(scene));
     }

@@ -19,6 +19,8 @@ mod light;
 mod line;
 mod trace;
 // ... and the whole.
+mod flicker;
 mod same_bits;
 mod surfaces;
 mod truth;
+mod why;

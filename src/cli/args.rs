@@ -34,6 +34,8 @@ pub enum Command {
     Explain(Box<ExplainArguments>),
     /// Tells why there is a line at a place of the picture, or why there is none.
     Why(Box<WhyArguments>),
+    /// Measures how much lines change from frame to frame beyond what motion explains.
+    Flicker(Box<FlickerArguments>),
     /// Checks, measures, starts and shows shaders.
     Shader {
         /// What to do.
@@ -90,6 +92,39 @@ pub struct ExplainArguments {
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  \
+        tusche flicker scene.toml --samples 16\n  \
+        tusche flicker scene.toml --frames 1-24 --step 0.05,0\n  \
+        tusche flicker walk.glb --frames 1-12 --animate --size 320x180",
+    mut_arg("output", |argument| argument.hide(true)),
+    mut_arg("layer", |argument| argument.hide(true)),
+    mut_arg("lines", |argument| argument.hide(true))
+)]
+pub struct FlickerArguments {
+    #[command(flatten)]
+    pub scene: SceneArguments,
+    /// Frames A to B of a path along which the film moves by a part of a pixel each time.
+    #[arg(long, value_name = "A-B", default_value = "1-9")]
+    pub frames: FrameRange,
+    /// How far the film moves from each frame to the next, in pixels.
+    #[arg(long, value_name = "X,Y", default_value = "0.117,0.071", allow_hyphen_values = true)]
+    pub step: Step,
+    /// Plays the scene's animation, too: each frame is that of its number.
+    #[arg(long, conflicts_with = "frame")]
+    pub animate: bool,
+    /// Samples of each of the two references, as a multiple of the picture's.
+    #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u32).range(1..=1024))]
+    pub reference: u32,
+    /// How many threads render [default: one for each core].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub threads: Option<u16>,
+    /// Prints the numbers as JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Examples:\n  \
         tusche why scene.toml 320,200              the sample nearest to the middle of a pixel\n  \
         tusche why scene.toml 320.25,200.75        the sample nearest to a place in it\n  \
         tusche why scene.toml 10,10 --size 64x48 --json",
@@ -109,7 +144,7 @@ pub struct WhyArguments {
 }
 
 /// What decides the picture itself.
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, Args)]
 pub struct SceneArguments {
     /// A scene file (.toml), or a model (.gltf, .glb) to render as it is.
     #[arg(value_name = "SCENE")]
@@ -290,6 +325,23 @@ impl FromStr for Crop {
             return Err("X0 and Y0 must be 0 or more, X1 above X0, and Y1 above Y0".into());
         }
         Ok(Self(PixelRect { x0, y0, x1, y1 }))
+    }
+}
+
+/// `X,Y`: two finite numbers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Step(pub [f64; 2]);
+
+impl FromStr for Step {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (x, y) = text.split_once(',').ok_or("write it as X,Y, for example 0.1,0.05")?;
+        let number = |text: &str| {
+            let number = text.trim().parse::<f64>().ok().filter(|number| number.is_finite());
+            number.ok_or_else(|| format!("`{text}` is not a number of pixels"))
+        };
+        Ok(Self([number(x)?, number(y)?]))
     }
 }
 

@@ -5,6 +5,7 @@
 mod args;
 mod compare;
 mod explain;
+mod flicker;
 mod render;
 mod request;
 mod shader;
@@ -56,6 +57,7 @@ pub fn run() -> u8 {
         Command::Render(arguments) => render::run(&arguments),
         Command::Explain(arguments) => explain::run(&arguments),
         Command::Why(arguments) => why::run(&arguments),
+        Command::Flicker(arguments) => flicker::run(&arguments),
         Command::Shader { command } => shader::run(&command),
         Command::Compare(arguments) => compare::run(&arguments),
         Command::Schema => print(&format!("{:#}\n", crate::scene::file::schema())),

@@ -211,7 +211,7 @@ impl Bounds {
     };
 
     #[inline]
-    pub(super) fn union(&self, other: &Self, nodes: &NodeColumns) -> Self {
+    pub(super) fn union(&self, other: &Self, nodes: &NodeColumns, rules: &Rules) -> Self {
         let range = |a: [u32; 2], b: [u32; 2]| [a[0].min(b[0]), a[1].max(b[1])];
         Self {
             object: range(self.object, other.object),
@@ -223,7 +223,9 @@ impl Bounds {
             thinnest_squared: self.thinnest_squared.min(other.thinnest_squared),
             stylist: match (self.stylist, other.stylist) {
                 (Stylist::None, one) | (one, Stylist::None) => one,
-                (Stylist::Alike(a), Stylist::Alike(b)) if style(nodes, a as usize) == style(nodes, b as usize) => {
+                (Stylist::Alike(a), Stylist::Alike(b))
+                    if style(nodes, a as usize, rules) == style(nodes, b as usize, rules) =>
+                {
                     Stylist::Alike(a)
                 }
                 _ => Stylist::Many,
@@ -379,13 +381,13 @@ impl PathBounds {
         if pixels.is_empty() {
             return;
         }
-        let bounds = pixels.iter().fold(Bounds::EMPTY, |all, pixel| all.union(&pixel.bounds, nodes));
+        let bounds = pixels.iter().fold(Bounds::EMPTY, |all, pixel| all.union(&pixel.bounds, nodes, rules));
         let shape = self.shapes.get(first..).unwrap_or_default().iter().fold(Shape::EMPTY, |all, one| all.union(one));
         let facets = FacetBounds::of_all(self.facets.get(first..).unwrap_or_default());
         let start = self.by_rank.len();
         self.by_rank.extend((0..).take(pixels.len()).map(|index: u8| index));
         self.by_rank[start..].sort_unstable_by_key(|&index| (pixels[usize::from(index)].bounds.best, index));
-        self.bounds = self.bounds.union(&bounds, nodes);
+        self.bounds = self.bounds.union(&bounds, nodes, rules);
         self.shape = self.shape.union(&shape);
         self.facets_of_all = self.facets_of_all.union(&facets);
         self.blocks.push(Block { rect, bounds, shape, facets, first: first as u32, end: self.pixels.len() as u32 });
@@ -441,7 +443,7 @@ pub(super) fn of_rows(
             }
         }
     }
-    bounds.radius_squared = wide;
+    bounds.radius_squared = rules.widest_squared(wide);
     if narrow > 0.0 {
         bounds.best = bounds.highest;
         bounds.thinnest_squared = narrow;
@@ -454,18 +456,24 @@ pub(super) fn of_rows(
             }
         }
     }
+    if bounds.thinnest_squared < f32::INFINITY {
+        bounds.thinnest_squared = rules.thinnest_squared(bounds.thinnest_squared);
+    }
     bounds.stylist = stylist(radii_squared, nodes, first, end, rules);
     bounds
 }
 
 fn stylist(radii_squared: &Column<f32>, nodes: &NodeColumns, first: usize, end: usize, rules: &Rules) -> Stylist {
     let Some(row) = (first..end).find(|row| radii_squared.get(*row) > 0.0) else { return Stylist::None };
-    let own = style(nodes, row);
+    let own = style(nodes, row, rules);
     // What is seen through a line depends on the pair.
     let opaque = own.is_opaque(rules);
     let alike = match (&nodes.line_color, &nodes.line_width, &nodes.line_opacity) {
-        (Column::Constant(_), Column::Constant(_), Column::Constant(_)) => opaque,
-        _ => opaque && (row + 1..end).all(|row| radii_squared.get(row) <= 0.0 || style(nodes, row) == own),
+        (Column::Constant(_), Column::Constant(_), Column::Constant(_)) if rules.no_scripts() => opaque,
+        _ => {
+            let mut others = (row + 1..end).filter(|row| radii_squared.get(*row) > 0.0);
+            opaque && others.all(|row| style(nodes, row, rules) == own)
+        }
     };
     if alike { Stylist::Alike(row as u32) } else { Stylist::Many }
 }

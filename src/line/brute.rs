@@ -1,7 +1,7 @@
 //! The definition as plain loops (DESIGN section 3.2), to be read beside the text. The oracle of [`super::search`]. For
 //! lists of surfaces see [`super::list`].
 
-use super::pair::{Found, MOST_LINES, Pair, Taken, distance_squared, fired};
+use super::pair::{Found, MOST_LINES, Pair, Taken, distance_squared, fired, is_opaque};
 use super::window::{PathTile, PathWindow};
 use super::{LineCounts, Rules};
 use crate::sample::PixelRect;
@@ -27,8 +27,7 @@ pub(super) fn find(
             pairs.push(pair);
             // Through a line that is not opaque, the next is seen.
             let Some(neighbors) = &window.tiles[pair.tile as usize] else { break };
-            let (nodes, styling) = if pair.own { (targets, row) } else { (neighbors, pair.row as usize) };
-            if nodes.alpha(styling, rules) >= 1.0 {
+            if is_opaque(rules, (targets, row), (neighbors, pair.row as usize), pair.own) {
                 break;
             }
             taken.take(&neighbors.features(pair.row as usize), pair.own);
@@ -63,7 +62,8 @@ fn seen(
                 counts.pairs_tested += 1;
 
                 // … with differ(t, n), as the material of the priority sample tests:
-                if fired(rules, (targets, target, &t), (tile, row, &n)).is_empty() {
+                let fired = fired(rules, (targets, target, &t), (tile, row, &n));
+                if fired.is_empty() {
                     continue;
                 }
                 // the priority sample p: the larger explicit priority, else the shorter depth, else t.
@@ -72,9 +72,11 @@ fn seen(
                 if taken.contains(&n.features, own) {
                     continue;
                 }
-                // The pair is valid if |x_t − x_n| < r'.
+                // The pair is valid if |x_t − x_n| < r', which the line's type may have changed.
                 let distance_squared = distance_squared(&t, n.pixel, n.offset);
-                if distance_squared >= p.radius_squared {
+                let radius_squared =
+                    rules.types().map_or(p.radius_squared, |types| types.radius_squared_of(fired, p.radius_squared));
+                if distance_squared >= radius_squared {
                     continue;
                 }
                 // Of all valid pairs the seen one minimises −priority_p, depth_p, |x_t − x_n|, index of n.

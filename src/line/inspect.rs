@@ -3,7 +3,7 @@
 //! For people who ask why a line is where it is, or why there is none. Plain and slow.
 
 use super::overlap::Facet;
-use super::pair::{LineNode, distance_squared, fired};
+use super::pair::{LineNode, distance_squared, fired, type_of};
 use super::window::{LineTile, PathTile};
 use super::{Fired, Rules};
 use crate::math::portable;
@@ -109,7 +109,10 @@ impl Sides<'_> {
         let (t, n) = (node(targets, *row), node(neighbors, *other));
         let own = !n.rank.outranks(t.rank);
         let (stylist, styling) = if own { (targets, *row) } else { (neighbors, *other) };
-        let width = stylist.nodes.line_width.get(styling);
+        let kind = type_of(rules, (targets, *row), (neighbors, *other));
+        let asked = stylist.nodes.line_width.get(styling);
+        let changed = rules.types().and_then(|types| types.style(kind).width).filter(|_| asked > 0.0);
+        let width = changed.unwrap_or(asked);
         let radius = rules.radius(width);
         let fired = fired(rules, (targets, *row, &t), (neighbors, *other, &n));
         let settings = rules.settings_of(stylist.nodes.shader.get(styling));
@@ -121,7 +124,7 @@ impl Sides<'_> {
             distance: distance_squared(&t, n.pixel, n.offset).sqrt(),
             radius,
             effective_width: if radius > 0.0 { width.min(rules.widest()).max(minimum) } else { 0.0 },
-            alpha: stylist.alpha(styling, rules),
+            alpha: stylist.alpha(styling, kind, rules),
         }
     }
 

@@ -10,6 +10,7 @@ use super::differ::Tests;
 use super::materials::TestColumns;
 use super::overlap::{Facet, FacetColumns};
 use super::pair::{LineNode, Rank};
+use super::types::{LaneReasons, TypeRules};
 use super::window::PathTile;
 
 /// Columns are filled up to a multiple of this with neighbours that are infinitely far.
@@ -188,18 +189,24 @@ impl Lanes {
     /// Scores the neighbours whose line the target sees, by rank; the best score.
     pub(super) fn score_others(&mut self, target: LaneTarget<'_>, rules: &Rules) -> u32 {
         // The neighbours' materials decide.
-        self.score::<false>(target, rules.tests(), rules.materials().is_some())
+        self.score::<false>(target, rules.tests(), rules.materials().is_some(), rules.types())
     }
 
     /// Scores the neighbours that give the target a line of its own, by distance; the best score.
     pub(super) fn score_own(&mut self, target: LaneTarget<'_>, rules: &Rules) -> u32 {
-        self.score::<true>(target, rules.tests_of(target.node.features.shader), false)
+        self.score::<true>(target, rules.tests_of(target.node.features.shader), false, rules.types())
     }
 
-    fn score<const OWN: bool>(&mut self, target: LaneTarget<'_>, tests: &Tests, mixed: bool) -> u32 {
+    fn score<const OWN: bool>(
+        &mut self,
+        target: LaneTarget<'_>,
+        tests: &Tests,
+        mixed: bool,
+        types: Option<&TypeRules>,
+    ) -> u32 {
         let end = self.keys.end_of_outranking(target.node.rank);
         let Self { columns, scores, certain, .. } = self;
-        self.arch.dispatch(Score::<OWN> { columns, scores, certain: *certain, target, end, tests, mixed })
+        self.arch.dispatch(Score::<OWN> { columns, scores, certain: *certain, target, end, tests, mixed, types })
     }
 
     /// The neighbours that the last scoring gave a score.
@@ -225,6 +232,8 @@ struct Score<'a, const OWN: bool> {
     tests: &'a Tests,
     /// Whether each neighbour is tested as its own column of tests says.
     mixed: bool,
+    /// What types change; no neighbour is certain then.
+    types: Option<&'a TypeRules>,
 }
 
 impl<const OWN: bool> pulp::WithSimd for Score<'_, OWN> {
@@ -233,16 +242,9 @@ impl<const OWN: bool> pulp::WithSimd for Score<'_, OWN> {
 
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) -> u32 {
-        if self.certain {
-            self.run::<{ Differ::CERTAIN }>()
-        } else if self.mixed {
-            self.run::<{ Differ::MIXED }>()
-        } else if self.tests.reads_facets() {
-            self.run::<{ Differ::BY_FACETS }>()
-        } else if self.tests.reads_shapes {
-            self.run::<{ Differ::BY_SHAPES }>()
-        } else {
-            self.run::<{ Differ::BY_IDS }>()
+        match self.types {
+            None => self.choose::<false>(),
+            Some(_) => self.choose::<true>(),
         }
     }
 }
@@ -260,8 +262,24 @@ impl Differ {
 
 impl<const OWN: bool> Score<'_, OWN> {
     #[inline(always)]
-    fn run<const DIFFER: u8>(self) -> u32 {
-        let Self { columns, scores, target: LaneTarget { node: target, facet: own_facet }, end, tests, .. } = self;
+    fn choose<const TYPED: bool>(self) -> u32 {
+        if self.certain {
+            self.run::<{ Differ::CERTAIN }, TYPED>()
+        } else if self.mixed {
+            self.run::<{ Differ::MIXED }, TYPED>()
+        } else if self.tests.reads_facets() {
+            self.run::<{ Differ::BY_FACETS }, TYPED>()
+        } else if self.tests.reads_shapes {
+            self.run::<{ Differ::BY_SHAPES }, TYPED>()
+        } else {
+            self.run::<{ Differ::BY_IDS }, TYPED>()
+        }
+    }
+
+    #[inline(always)]
+    fn run<const DIFFER: u8, const TYPED: bool>(self) -> u32 {
+        let Self { columns, scores, target: LaneTarget { node: target, facet: own_facet }, end, tests, types, .. } =
+            self;
         let count = scores.len();
         let ids = if DIFFER >= Differ::BY_IDS { count } else { 0 };
         let shapes = if DIFFER >= Differ::BY_SHAPES { count } else { 0 };
@@ -287,8 +305,12 @@ impl<const OWN: bool> Score<'_, OWN> {
             // As `pair::fired`.
             let tests = if DIFFER == Differ::MIXED { mixed.get(i) } else { common };
             let mut differs = true;
+            let mut reasons = LaneReasons::default();
             if DIFFER >= Differ::BY_IDS {
-                differs = (tests.object & (object[i] != own.object)) | (tests.shader & (shader[i] != own.shader));
+                reasons.miss = !own_hit | (object[i] == 0);
+                reasons.object = tests.object & (object[i] != own.object);
+                reasons.shader = tests.shader & (shader[i] != own.shader);
+                differs = reasons.object | reasons.shader;
             }
             if DIFFER >= Differ::BY_SHAPES {
                 let [u, v] = [own.uv[0] - uv[0][i], own.uv[1] - uv[1][i]];
@@ -296,24 +318,28 @@ impl<const OWN: bool> Score<'_, OWN> {
                     [own.normal[0] - normal[0][i], own.normal[1] - normal[1][i], own.normal[2] - normal[2][i]];
                 let [r, g, b] =
                     [own.feature[0] - feature[0][i], own.feature[1] - feature[1][i], own.feature[2] - feature[2][i]];
-                let shapes = (u * u + v * v > tests.uv_squared)
-                    | (x * x + y * y + z * z > tests.chord_squared)
-                    | (r.abs() > tests.feature)
-                    | (g.abs() > tests.feature)
-                    | (b.abs() > tests.feature);
-                differs |= own_hit & (object[i] != 0) & shapes;
+                reasons.uv = !reasons.miss & (u * u + v * v > tests.uv_squared);
+                reasons.normal = !reasons.miss & (x * x + y * y + z * z > tests.chord_squared);
+                let colors = (r.abs() > tests.feature) | (g.abs() > tests.feature) | (b.abs() > tests.feature);
+                reasons.feature = !reasons.miss & colors;
+                differs |= reasons.uv | reasons.normal | reasons.feature;
             }
             if DIFFER >= Differ::BY_FACETS {
                 let overlaps = own_facet.overlaps(&facet.get(i), distance_squared, tests.overlap);
-                differs |= own_hit & (object[i] == own.object) & overlaps;
+                reasons.overlap = own_hit & (object[i] == own.object) & overlaps;
+                differs |= reasons.overlap;
+            }
+            let mut radius_squared = if OWN { target.radius_squared } else { radius_squared[i] };
+            if let (true, Some(types)) = (TYPED, types) {
+                radius_squared = reasons.radius_squared(types, radius_squared);
             }
 
             let score = if OWN {
-                let valid = (distance_squared < target.radius_squared) & differs & (key[i] >= end);
+                let valid = (distance_squared < radius_squared) & differs & (key[i] >= end);
                 // Squares are not negative, so their bits are in their order.
                 if valid { distance_squared.to_bits() } else { NONE }
             } else {
-                let valid = (distance_squared < radius_squared[i]) & differs & (key[i] < end);
+                let valid = (distance_squared < radius_squared) & differs & (key[i] < end);
                 if valid { key[i] } else { NONE }
             };
             scores[i] = score;

@@ -23,17 +23,19 @@ mod pair;
 mod rules;
 mod search;
 mod style;
+mod types;
 mod window;
 
 pub use bounds::TileBounds;
 pub use differ::Fired;
 pub use inspect::{InspectedPair, TestResult, inspect, nearest_difference};
 pub use rules::Rules;
+pub use style::LineScripts;
 pub use window::{LineTile, Window};
 
 pub use crate::scene::settings::LineType;
 
-use crate::sample::{NodePath, PixelRect};
+use crate::sample::{GateCounts, NodePath, PixelRect};
 use list::Kind;
 use pair::LineNode;
 use window::PathTile;
@@ -85,6 +87,8 @@ pub struct LineBuffer {
     pub lines: Vec<SeenLine>,
     /// Work done, for `--stats`.
     pub counts: LineCounts,
+    /// What scripts gave for lines that is no number, by `shader` value; may be shorter than there are materials.
+    pub gate: Vec<GateCounts>,
 }
 
 /// Work done by the line pass.
@@ -115,11 +119,20 @@ impl std::ops::AddAssign for LineCounts {
 /// A line that is not opaque (thinner than the minimum width, or with an opacity) shows the next one in the order of keys,
 /// and so on until they are opaque. Each surface (object and material) draws or borders at most one of a sample's lines at
 /// a path, else the many pairs that see one edge would count as many lines; there are at most 8.
+///
+/// `scripts` style the lines of materials that [`Rules::with_scripts`] names.
 #[must_use]
-pub fn find_lines(window: &Window<'_>, target: LineTile<'_>, rules: &Rules, method: Method) -> LineBuffer {
+pub fn find_lines(
+    window: &Window<'_>,
+    target: LineTile<'_>,
+    rules: &Rules,
+    method: Method,
+    mut scripts: Option<&mut (dyn LineScripts + '_)>,
+) -> LineBuffer {
     let mut lined = vec![false; target.buffer.samples()];
     let mut lines: Vec<(u32, SeenLine)> = Vec::new();
     let mut counts = LineCounts::default();
+    let mut gate = Vec::new();
     let lists = rules.surfaces() > 1;
     // Hidden lines come last: they are drawn where no visible line of any path is.
     let passes = target.buffer.paths.iter().map(|nodes| (nodes, Kind::Visible));
@@ -149,19 +162,16 @@ pub fn find_lines(window: &Window<'_>, target: LineTile<'_>, rules: &Rules, meth
                 break;
             }
         };
-        for found in found {
-            let sample = nodes.rows.sample(found.row);
-            if let Some(line) = style::style(&at_path, &targets, &found, rules) {
-                lined[sample as usize] = true;
-                lines.push((sample, line));
-            }
+        for (sample, line) in style::style(&at_path, &targets, &found, rules, scripts.as_deref_mut(), &mut gate) {
+            lined[sample as usize] = true;
+            lines.push((sample, line));
         }
     }
     lines.sort_unstable_by_key(|&(sample, _)| sample);
     counts.lined_samples = lines.len() as u64;
     counts.hidden_samples = lines.iter().filter(|(_, line)| line.hidden).count() as u64;
     let (samples, lines) = lines.into_iter().unzip();
-    LineBuffer { rect: target.buffer.rect, samples, lines, counts }
+    LineBuffer { rect: target.buffer.rect, samples, lines, counts, gate }
 }
 
 /// The samples that look for no hidden line at a path: those that have a line, and those whose rays go on through the

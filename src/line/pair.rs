@@ -1,10 +1,10 @@
 //! One target and one neighbour: who styles the line, whether it is valid, and which of two valid pairs is seen
 //! (DESIGN section 3.2). Everything here is shared by the oracle and the search, so they cannot disagree by a rounding.
 
-use super::Rules;
 use super::differ::{Features, Fired};
 use super::overlap::Facet;
 use super::window::PathTile;
+use super::{LineType, Rules};
 use crate::sample::NodePath;
 
 /// What orders nodes along the line of sight: explicit priority first, then the shorter depth.
@@ -70,8 +70,32 @@ pub(super) struct LineNode {
     pub offset: [f32; 2],
     pub features: Features,
     pub rank: Rank,
-    /// Square of the radius of its line ([`super::Rules::radius`]), 0 if it draws none.
+    /// Square of the radius of its line ([`super::Rules::radius`]) but for what types change, 0 if it draws none.
     pub radius_squared: f32,
+}
+
+/// Which type of line a target and a neighbour make, each a tile and a row; `None` if no type changes anything.
+pub(super) fn type_of(
+    rules: &Rules,
+    (targets, row): (&PathTile<'_>, usize),
+    (neighbors, neighbor): (&PathTile<'_>, usize),
+) -> Option<LineType> {
+    rules.types()?;
+    let node = |tile: &PathTile<'_>, row: usize| tile.node(tile.buffer.pixel_of(tile.nodes.rows.sample(row)), row);
+    let (t, n) = (node(targets, row), node(neighbors, neighbor));
+    LineType::of(fired(rules, (targets, row, &t), (neighbors, neighbor, &n)))
+}
+
+/// Whether nothing is seen through the line of a pair.
+pub(super) fn is_opaque(
+    rules: &Rules,
+    target: (&PathTile<'_>, usize),
+    neighbor: (&PathTile<'_>, usize),
+    own: bool,
+) -> bool {
+    let (nodes, row) = if own { target } else { neighbor };
+    // What a script makes of it is not known yet.
+    !rules.is_scripted(nodes.nodes.shader.get(row)) && nodes.alpha(row, type_of(rules, target, neighbor), rules) >= 1.0
 }
 
 /// Which tests find a difference between a target and a neighbour, each with its tile and row: those of the priority

@@ -2,6 +2,7 @@
 
 use super::differ::Tests;
 use super::materials::MaterialTests;
+use super::types::TypeRules;
 use crate::math::portable;
 use crate::sample::NodePath;
 use crate::scene::settings::{LineOverrides, LineSettings, RayKinds};
@@ -17,6 +18,9 @@ pub struct Rules {
     /// The loosest tests of any material.
     tests: Tests,
     materials: Option<MaterialTests>,
+    types: Option<TypeRules>,
+    /// By `shader` value: whose lines a script styles one by one.
+    scripted: Vec<bool>,
     exact_pairs: bool,
     hidden: Option<HiddenStyle>,
 }
@@ -54,6 +58,8 @@ impl Rules {
             unit_gap: f64::from(unit_gap),
             tests: Tests::new(settings),
             materials: None,
+            types: None,
+            scripted: Vec::new(),
             exact_pairs: true,
             hidden: None,
             settings: settings.clone(),
@@ -68,7 +74,7 @@ impl Rules {
                 ids
             }),
         });
-        rules
+        Self { types: TypeRules::new(&rules), ..rules }
     }
 
     /// The same rules, knowing that no width that a shader gives is above `width` pixels: less reach, so smaller halos. A
@@ -76,7 +82,45 @@ impl Rules {
     #[must_use]
     pub fn with_widest(mut self, width: f32) -> Self {
         self.widest = self.widest.min(width.max(0.0));
+        self.types = TypeRules::new(&self);
         self
+    }
+
+    /// The same rules, knowing whose lines a script styles one by one, by material id. Such a line may be of any opacity.
+    #[must_use]
+    pub fn with_scripts(mut self, materials: &[bool]) -> Self {
+        if materials.contains(&true) {
+            self.scripted = std::iter::once(false).chain(materials.iter().copied()).collect();
+        }
+        self
+    }
+
+    /// What types change, if any does.
+    pub(super) fn types(&self) -> Option<&TypeRules> {
+        self.types.as_ref()
+    }
+
+    /// Whether a script styles the lines of a material, by its `shader` value.
+    #[inline]
+    pub(super) fn is_scripted(&self, shader: u32) -> bool {
+        self.scripted.get(shader as usize).is_some_and(|scripted| *scripted)
+    }
+
+    /// Whether no script styles any line.
+    pub(super) fn no_scripts(&self) -> bool {
+        self.scripted.is_empty()
+    }
+
+    /// The squared radius of the widest line that a node can draw which asks for this one.
+    #[inline]
+    pub(super) fn widest_squared(&self, asked_squared: f32) -> f32 {
+        self.types.as_ref().map_or(asked_squared, |types| types.widest_squared(asked_squared))
+    }
+
+    /// The squared radius of the thinnest.
+    #[inline]
+    pub(super) fn thinnest_squared(&self, asked_squared: f32) -> f32 {
+        self.types.as_ref().map_or(asked_squared, |types| types.thinnest_squared(asked_squared))
     }
 
     /// The same rules with what each material changes about the tests, in the order of their ids.
@@ -100,7 +144,8 @@ impl Rules {
     }
 
     pub(super) fn exact_pairs(&self) -> bool {
-        self.exact_pairs
+        // What a line looks like depends on the pair where types differ.
+        self.exact_pairs || self.types.is_some()
     }
 
     /// How many surfaces a list holds at most.

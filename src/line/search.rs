@@ -27,11 +27,11 @@
 //! - the same, any pair that looks alike: 112, 161, 168.
 
 use super::bounds::{Block, Bounded, PathBounds, PixelNodes, Stylist};
-use super::differ::Tests;
+use super::differ::{Fired, Tests};
 use super::lanes::{LaneTarget, Lanes, Origin};
 use super::materials::{certainty, may_differ, may_matter};
 use super::overlap::Facet;
-use super::pair::{Found, LineNode, MOST_LINES, Pair, Rank, Taken, distance_squared};
+use super::pair::{Found, LineNode, MOST_LINES, Pair, Rank, Taken, distance_squared, is_opaque};
 use super::window::{LineStyle, PathTile, PathWindow};
 use super::{LineCounts, Rules};
 use crate::sample::PixelRect;
@@ -114,6 +114,8 @@ struct Target {
     row: usize,
     node: LineNode,
     facet: Facet,
+    /// The squared radius of the widest line of its own, of any type.
+    reach_squared: f32,
     style: LineStyle,
     opaque: bool,
     best: Option<Pair>,
@@ -140,7 +142,7 @@ impl Target {
     fn too_far(&self, distance_squared: f32) -> bool {
         match self.best {
             Some(best) => distance_squared > best.distance_squared,
-            None => distance_squared >= self.node.radius_squared,
+            None => distance_squared >= self.reach_squared,
         }
     }
 }
@@ -218,9 +220,10 @@ impl<'w> Search<'w, '_> {
             }
             let node = nodes.node(pixel.pixel, row);
             self.targets.push({
-                let style = nodes.style(row);
+                let style = nodes.style(row, self.rules);
+                let reach_squared = self.rules.widest_squared(node.radius_squared);
                 let facet = if self.tests.reads_facets() { Facet::of(nodes.nodes, row) } else { Facet::NONE };
-                Target { row, node, facet, style, opaque: style.is_opaque(self.rules), best: None }
+                Target { row, node, facet, reach_squared, style, opaque: style.is_opaque(self.rules), best: None }
             });
         }
         self.search_others(pixel.pixel, &bounded);
@@ -261,7 +264,8 @@ impl<'w> Search<'w, '_> {
                 Stylist::None => true,
                 Stylist::Many => false,
                 Stylist::Alike(row) => {
-                    let style = self.window.tiles[tile as usize].as_ref().map(|nodes| nodes.style(row as usize));
+                    let style =
+                        self.window.tiles[tile as usize].as_ref().map(|nodes| nodes.style(row as usize, self.rules));
                     style == *common.get_or_insert(style)
                 }
             })
@@ -281,7 +285,9 @@ impl<'w> Search<'w, '_> {
         if best.own {
             return target.style == style;
         }
-        self.window.tiles[best.tile as usize].as_ref().is_some_and(|nodes| nodes.style(best.row as usize) == style)
+        self.window.tiles[best.tile as usize]
+            .as_ref()
+            .is_some_and(|nodes| nodes.style(best.row as usize, self.rules) == style)
     }
 
     /// Goes through the candidates, the highest-ranking first.
@@ -294,7 +300,7 @@ impl<'w> Search<'w, '_> {
                 break;
             }
             self.lanes.clear();
-            self.lanes.certain = self.certain;
+            self.lanes.certain = self.certain && self.rules.types().is_none();
             while let Some(candidate) = self.candidates.get(next).copied()
                 && self.lanes.len() < batch
             {
@@ -388,10 +394,9 @@ impl<'w> Search<'w, '_> {
                 continue;
             }
             // The last own line may be another's here.
-            let radius_squared = target.node.radius_squared;
-            let limit = target.best.map_or(radius_squared, |best| best.distance_squared);
+            let limit = target.best.map_or(target.reach_squared, |best| best.distance_squared);
             own.limit = own.limit.max(limit);
-            own.thinnest = own.thinnest.min(radius_squared);
+            own.thinnest = own.thinnest.min(self.rules.thinnest_squared(target.node.radius_squared));
             own.highest = own.highest.better(target.node.rank);
             own.lowest = own.lowest.worse(target.node.rank);
         }
@@ -403,7 +408,7 @@ impl<'w> Search<'w, '_> {
                     break;
                 }
                 self.lanes.clear();
-                self.lanes.certain = self.certain;
+                self.lanes.certain = self.certain && self.rules.types().is_none();
                 while let Some(candidate) = self.candidates.get(next).copied()
                     && self.lanes.len() < batch
                 {
@@ -422,7 +427,7 @@ impl<'w> Search<'w, '_> {
                         }
                     }
                     if open(&target) {
-                        let limit = target.best.map_or(target.node.radius_squared, |best| best.distance_squared);
+                        let limit = target.best.map_or(target.reach_squared, |best| best.distance_squared);
                         own.limit = own.limit.max(limit);
                     }
                 }
@@ -478,12 +483,7 @@ impl<'w> Search<'w, '_> {
         while behind.len() + 1 < MOST_LINES {
             let target = &mut self.targets[target];
             let Some(neighbors) = &self.window.tiles[last.tile as usize] else { break };
-            let alpha = if last.own {
-                nodes.alpha(target.row, self.rules)
-            } else {
-                neighbors.alpha(last.row as usize, self.rules)
-            };
-            if alpha >= 1.0 {
+            if is_opaque(self.rules, (nodes, target.row), (neighbors, last.row as usize), last.own) {
                 break;
             }
             taken.take(&neighbors.features(last.row as usize), last.own);
@@ -533,9 +533,9 @@ fn keep(window: &PathWindow<'_>, rules: &Rules, target: &mut Target, origin: &Or
     let rank = nodes.rank(row as usize);
     let own = !rank.outranks(t.rank);
     let distance_squared = distance_squared(t, pixel, nodes.offset(row as usize));
-    let (rank, radius_squared) =
+    let (rank, asked_squared) =
         if own { (t.rank, t.radius_squared) } else { (rank, nodes.bounds.radius_squared.get(row as usize)) };
-    if distance_squared >= radius_squared {
+    if distance_squared >= rules.widest_squared(asked_squared) {
         return;
     }
     let pair = Pair { rank, distance_squared, pixel, tile, row, surface: 0, own };
@@ -550,7 +550,15 @@ fn keep(window: &PathWindow<'_>, rules: &Rules, target: &mut Target, origin: &Or
             && !n.is_miss()
             && target.facet.overlaps(&Facet::of(nodes.nodes, row as usize), distance_squared, tests.overlap)
     };
-    if tests.differ(&t.features, &n) || (tests.reads_facets() && overlaps()) {
+    let Some(types) = rules.types() else {
+        if tests.differ(&t.features, &n) || (tests.reads_facets() && overlaps()) {
+            target.best = Some(pair);
+        }
+        return;
+    };
+    let mut fired = tests.fired(&t.features, &n);
+    fired.set(Fired::OVERLAP, tests.reads_facets() && overlaps());
+    if !fired.is_empty() && distance_squared < types.radius_squared_of(fired, asked_squared) {
         target.best = Some(pair);
     }
 }

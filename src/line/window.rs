@@ -2,11 +2,12 @@
 
 use std::ops::Range;
 
-use super::Rules;
 use super::bounds::{PathBounds, TileBounds};
 use super::differ::Features;
 use super::pair::{LineNode, Rank};
+use super::{LineType, Rules};
 use crate::sample::{NodeColumns, NodePath, PixelRect, SampleBuffer};
+use crate::scene::settings::TypeStyle;
 
 /// A tile of samples with what the line pass has prepared for it.
 #[derive(Clone, Copy, Debug)]
@@ -142,9 +143,9 @@ impl<'a> PathTile<'a> {
         Rank::new(self.nodes.priority.get(row), self.nodes.depth.get(row))
     }
 
-    /// How much the line of a row covers, 0 … 1.
-    pub(super) fn alpha(&self, row: usize, rules: &Rules) -> f32 {
-        alpha(self.nodes, row, rules)
+    /// How much the line of a row covers, 0 … 1, if it is of a type that may change it.
+    pub(super) fn alpha(&self, row: usize, kind: Option<LineType>, rules: &Rules) -> f32 {
+        alpha(self.nodes, row, kind, rules)
     }
 
     /// Where the surface at a place of a row's list is kept: its columns and its row there.
@@ -156,8 +157,8 @@ impl<'a> PathTile<'a> {
     }
 
     #[inline(always)]
-    pub(super) fn style(&self, row: usize) -> LineStyle {
-        style(self.nodes, row)
+    pub(super) fn style(&self, row: usize, rules: &Rules) -> LineStyle {
+        style(self.nodes, row, rules)
     }
 
     #[inline(always)]
@@ -172,26 +173,31 @@ pub(super) struct LineStyle {
     color: [f32; 3],
     width: f32,
     opacity: f32,
+    /// Whether a script decides.
+    scripted: bool,
 }
 
 impl LineStyle {
     pub(super) fn is_opaque(&self, rules: &Rules) -> bool {
-        rules.alpha(self.width) * self.opacity >= 1.0
+        rules.alpha(self.width) * self.opacity >= 1.0 && !self.scripted
     }
 }
 
-/// How much the line of a row covers, 0 … 1.
-pub(super) fn alpha(nodes: &NodeColumns, row: usize, rules: &Rules) -> f32 {
-    rules.alpha(nodes.line_width.get(row)) * nodes.line_opacity.get(row)
+/// How much the line of a row covers, 0 … 1, if it is of a type that may change it.
+pub(super) fn alpha(nodes: &NodeColumns, row: usize, kind: Option<LineType>, rules: &Rules) -> f32 {
+    let changed = rules.types().map_or_else(TypeStyle::default, |types| types.style(kind));
+    let width = changed.width.unwrap_or_else(|| nodes.line_width.get(row));
+    rules.alpha(width) * nodes.line_opacity.get(row) * changed.opacity.unwrap_or(1.0)
 }
 
 /// The style of a row.
 #[inline(always)]
-pub(super) fn style(nodes: &NodeColumns, row: usize) -> LineStyle {
+pub(super) fn style(nodes: &NodeColumns, row: usize, rules: &Rules) -> LineStyle {
     LineStyle {
         color: nodes.line_color.get(row),
         width: nodes.line_width.get(row),
         opacity: nodes.line_opacity.get(row),
+        scripted: !rules.no_scripts() && rules.is_scripted(nodes.shader.get(row)),
     }
 }
 

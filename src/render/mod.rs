@@ -7,6 +7,7 @@
 
 mod files;
 mod grid;
+mod scripts;
 pub mod stats;
 pub mod why;
 
@@ -22,6 +23,7 @@ use crate::clock::CpuClock;
 use crate::diag::{Diagnostic, Diagnostics};
 use crate::film::{FilmTile, FilmWindow, develop};
 use crate::line::{LineBuffer, LineCounts, LineTile, Method, TileBounds, Window, find_lines};
+use crate::math::DVec3;
 use crate::plan::Plan;
 use crate::sample::{GateCounts, PixelRect, SampleBuffer};
 use crate::scene::Scene;
@@ -30,6 +32,7 @@ use crate::shade::{Lighting, ShadeErrors, Shaders};
 use crate::trace::wave::TracedTile;
 use crate::trace::{RayCounts, TileTracer, TraceContext, World};
 use grid::Grid;
+use scripts::ScriptedLines;
 use stats::{Lines, Seconds, ShaderStats, Stats};
 
 /// How to render; none of it changes the picture but `crop`, which leaves out parts.
@@ -102,7 +105,7 @@ pub fn render(
         let lighting = Lighting::new(scene, world.origin);
         let build = building.seconds();
         let tracer = TileTracer::new(scene, plan, &world, &lighting);
-        let mut render = Render::new(scene, shaders, plan, options, control, tracer);
+        let mut render = Render::new(scene, shaders, plan, options, control, tracer, world.origin);
         render.run(emit)?;
         let mut report = render.report();
         report.stats.seconds.build = build;
@@ -125,6 +128,8 @@ struct Render<'a> {
     control: &'a Control<'a>,
     method: Method,
     tracer: TileTracer<'a>,
+    /// The camera's place in the world.
+    origin: DVec3,
     grid: Grid,
     crop: PixelRect,
     /// Scratch memory and script engines, one for each thread that ever needed one.
@@ -185,6 +190,7 @@ impl<'a> Render<'a> {
         options: &RenderOptions,
         control: &'a Control<'a>,
         tracer: TileTracer<'a>,
+        origin: DVec3,
     ) -> Self {
         let picture = PixelRect::of_size(scene.render().size);
         let crop = options.crop.map_or(picture, |crop| crop.intersection(&picture));
@@ -199,6 +205,7 @@ impl<'a> Render<'a> {
             control,
             method: options.method,
             tracer,
+            origin,
             crop,
             contexts: Mutex::default(),
             samples: (0..grid.tiles()).map(|_| None).collect(),
@@ -284,10 +291,9 @@ impl<'a> Render<'a> {
     }
 
     fn sample(&self, tile: usize) -> Product {
-        let free = self.contexts.lock().unwrap_or_else(PoisonError::into_inner).pop();
-        let mut context = free.unwrap_or_else(|| TraceContext::new(self.scene, self.shaders));
+        let mut context = self.borrow_context();
         let traced = Box::new(self.tracer.trace(self.grid.rect(tile), &mut context));
-        self.contexts.lock().unwrap_or_else(PoisonError::into_inner).push(context);
+        self.return_context(context);
         let clock = CpuClock::thread();
         let bounds = self.plan.lines.as_ref().map(|lines| TileBounds::new(&traced.samples, &lines.rules));
         Product::Sampled { tile, traced, bounds, line_seconds: clock.seconds() }
@@ -299,7 +305,24 @@ impl<'a> Render<'a> {
         let tiles = part.tiles.iter().map(|tile| self.samples[*tile].as_ref()?.for_lines()).collect();
         let window = Window { origin: part.origin, tile: self.grid.tile, columns: part.columns, tiles };
         let target = self.samples[tile].as_ref()?.for_lines()?;
-        Some(find_lines(&window, target, &lines.rules, self.method))
+        if !lines.scripted {
+            return Some(find_lines(&window, target, &lines.rules, self.method, None));
+        }
+        let mut context = self.borrow_context();
+        let mut scripts = ScriptedLines::new(&mut context, self.origin);
+        let found = find_lines(&window, target, &lines.rules, self.method, Some(&mut scripts));
+        self.return_context(context);
+        Some(found)
+    }
+
+    /// A context that no thread uses at the moment.
+    fn borrow_context(&self) -> TraceContext<'a> {
+        let free = self.contexts.lock().unwrap_or_else(PoisonError::into_inner).pop();
+        free.unwrap_or_else(|| TraceContext::new(self.scene, self.shaders))
+    }
+
+    fn return_context(&self, context: TraceContext<'a>) {
+        self.contexts.lock().unwrap_or_else(PoisonError::into_inner).push(context);
     }
 
     fn develop(&self, tile: usize) -> FilmTile {
@@ -336,6 +359,7 @@ impl<'a> Render<'a> {
             Product::Lined { tile, lines, seconds } => {
                 totals.seconds.lines += seconds;
                 totals.lines += lines.counts;
+                totals.gate.iter_mut().zip(&lines.gate).for_each(|(total, gate)| *total += *gate);
                 self.lines[tile] = Some(lines);
             }
             Product::Developed { seconds } => totals.seconds.film += seconds,

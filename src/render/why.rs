@@ -9,6 +9,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::grid::Grid;
+use super::scripts::ScriptedLines;
 use crate::diag::{Diagnostic, Diagnostics};
 use crate::film::Layer;
 use crate::line::{
@@ -207,7 +208,9 @@ pub fn why(scene: &Scene, shaders: &Shaders, place: [f32; 2]) -> Result<(Explana
     };
 
     // Find the line, and the pair behind it.
-    let found = find_lines(&window, target, &lines.rules, Method::Exact);
+    let mut context = TraceContext::new(scene, shaders);
+    let mut scripts = ScriptedLines::new(&mut context, world.origin);
+    let found = find_lines(&window, target, &lines.rules, Method::Exact, Some(&mut scripts));
     let sample = nearest_sample(target.buffer, pixel, place);
     let seen = found.samples.binary_search(&sample).ok().map(|index| found.lines[index]);
     let namer = Namer { scene };

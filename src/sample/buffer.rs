@@ -276,6 +276,8 @@ pub struct NodeColumnSet {
     pub member: bool,
     /// The overlap test is on: position, geometric normal, footprint.
     pub overlap: bool,
+    /// A script that styles lines reads positions.
+    pub position: bool,
     /// Tint or throughput composition is on and there are secondary paths.
     pub throughput: bool,
     /// Throughput composition is on.
@@ -292,6 +294,7 @@ impl NodeColumnSet {
         lines: true,
         member: true,
         overlap: true,
+        position: true,
         throughput: true,
         contribution: true,
     };

@@ -122,7 +122,7 @@ impl SampleBufferBuilder {
         if node.object == 0 {
             return;
         }
-        let kept = NodeColumnSet { member: false, throughput: false, contribution: false, ..self.layout.columns };
+        let kept = NodeColumnSet { throughput: false, contribution: false, ..self.layout.columns };
         let (node, faults) = clean_node(node, kept, self.layout.max_width_of(node.shader));
         self.gate.note(path, sample, node.shader, faults);
         let place = self.behind.iter().position(|(rows, of)| *of == surface && rows.path == path);
@@ -283,8 +283,10 @@ impl PathRows {
         if kept.member {
             self.member.push(row, node.member, expected);
         }
-        if kept.overlap {
+        if kept.overlap || kept.position {
             self.position.push(row, node.position, expected);
+        }
+        if kept.overlap {
             self.geometric_normal.push(row, node.geometric_normal, expected);
             self.footprint.push(row, node.footprint, expected);
         }

@@ -128,8 +128,10 @@ pub(super) fn clean_node(node: Node, kept: NodeColumnSet, max_width: f32) -> (No
         node.line_width = faults.width(node.line_width, max_width);
         node.line_opacity = faults.number(node.line_opacity).clamp(0.0, 1.0);
     }
-    if kept.overlap {
+    if kept.overlap || kept.position {
         node.position = faults.numbers(node.position);
+    }
+    if kept.overlap {
         node.geometric_normal = faults.normal(node.geometric_normal);
         node.footprint = faults.number(node.footprint).abs();
     }
@@ -140,6 +142,20 @@ pub(super) fn clean_node(node: Node, kept: NodeColumnSet, max_width: f32) -> (No
         node.contribution = faults.numbers(node.contribution);
     }
     (node, faults)
+}
+
+/// What a script makes of a line, as it may be drawn: the neutral values are those of a node's line.
+#[must_use]
+pub fn clean_line_style(color: [f32; 3], opacity: f32) -> ([f32; 3], f32, GateCounts) {
+    let mut faults = Faults::default();
+    let color = faults.numbers(color);
+    let opacity = faults.number(opacity).clamp(0.0, 1.0);
+    let counts = GateCounts {
+        nan: faults.contains(Faults::NAN).into(),
+        infinite: faults.contains(Faults::INFINITE).into(),
+        ..GateCounts::default()
+    };
+    (color, opacity, counts)
 }
 
 /// Who did what, until the counts are drawn up.

@@ -1,7 +1,7 @@
 //! Cameras: from a film position to a ray.
 
 use crate::diag::Diagnostic;
-use crate::math::{DMat3, DVec3, Vec3, portable};
+use crate::math::{DMat3, DVec2, DVec3, Vec3, portable};
 
 /// How directions relate to film positions.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,6 +29,8 @@ pub struct Camera {
     pub position: DVec3,
     /// Rotation of the camera's axes into the world: columns are right, up and *backward*.
     pub world_from_camera: DMat3,
+    /// How far the film is moved, in pixels: the picture's (0, 0) shows what lies at this film position otherwise.
+    pub film_shift: DVec2,
 }
 
 impl Camera {
@@ -56,7 +58,13 @@ impl Camera {
             .ok_or_else(|| Diagnostic::error("the camera's up vector is zero or points along the line of sight"))?
             .normalize();
         let up = backward.cross(right);
-        Ok(Self { name: name.into(), projection, position, world_from_camera: DMat3::from_cols(right, up, backward) })
+        Ok(Self {
+            name: name.into(),
+            projection,
+            position,
+            world_from_camera: DMat3::from_cols(right, up, backward),
+            film_shift: DVec2::ZERO,
+        })
     }
 
     /// The ray through a film position of a picture of `size` pixels.
@@ -67,8 +75,9 @@ impl Camera {
     #[must_use]
     pub fn ray(&self, size: [u32; 2], pixel: [i32; 2], offset: [f32; 2]) -> (Vec3, Vec3) {
         let [width, height] = size.map(f64::from);
-        let x = (f64::from(pixel[0]) - width / 2.0 + f64::from(offset[0])) / (height / 2.0);
-        let y = -(f64::from(pixel[1]) - height / 2.0 + f64::from(offset[1])) / (height / 2.0);
+        let shift = self.film_shift;
+        let x = (f64::from(pixel[0]) - width / 2.0 + f64::from(offset[0]) + shift.x) / (height / 2.0);
+        let y = -(f64::from(pixel[1]) - height / 2.0 + f64::from(offset[1]) + shift.y) / (height / 2.0);
         match self.projection {
             Projection::Perspective { fov_y } => {
                 let half = libm::tan(fov_y / 2.0);

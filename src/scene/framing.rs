@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::SceneBuilder;
 use super::camera::{Camera, Projection};
 use super::light::{Light, LightKind};
-use crate::math::{DMat3, DVec3, Vec3};
+use crate::math::{DMat3, DVec2, DVec3, Vec3};
 
 /// Vertical field of view of the framing camera, in degrees: long enough not to distort, short enough to show depth.
 pub const FIELD_OF_VIEW_DEGREES: f64 = 30.0;
@@ -77,6 +77,7 @@ pub fn frame_camera(bounds: Option<(DVec3, DVec3)>, size: [u32; 2]) -> Camera {
         projection: Projection::Perspective { fov_y },
         position: center + world_from_camera * eye,
         world_from_camera,
+        film_shift: DVec2::ZERO,
     }
 }
 

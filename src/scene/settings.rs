@@ -118,7 +118,8 @@ pub enum LineType {
 
 impl LineType {
     /// All of them, the strongest reason first.
-    pub const ALL: [Self; 6] = [Self::Outline, Self::Silhouette, Self::Material, Self::Crease, Self::Uv, Self::Feature];
+    pub const ALL: [Self; 7] =
+        [Self::Outline, Self::Silhouette, Self::Overlap, Self::Material, Self::Crease, Self::Uv, Self::Feature];
 
     /// As layers, scene files and scripts call it.
     #[must_use]
@@ -133,6 +134,17 @@ impl LineType {
             Self::Feature => "feature",
         }
     }
+}
+
+/// What a type of line changes about what its shader asks for.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct TypeStyle {
+    /// Colour, linear.
+    pub color: Option<Vec3>,
+    /// Full width in pixels; 0 draws none of the type.
+    pub width: Option<f32>,
+    /// Multiplies the opacity, 0 … 1.
+    pub opacity: Option<f32>,
 }
 
 /// How a line at a reflected or refracted node enters the sample's colour.
@@ -177,6 +189,8 @@ pub struct LineSettings {
     pub tint: bool,
     /// How they enter the sample.
     pub compose: Composition,
+    /// What each type changes, in the order of [`LineType::ALL`].
+    pub types: [TypeStyle; LineType::ALL.len()],
     /// How many surfaces a ray's list holds at most (DESIGN section 3.4), at least 1.
     pub surfaces: u32,
     /// How lines of surfaces behind the first are drawn; `None` if they are not. Needs `surfaces` above 1.
@@ -212,6 +226,7 @@ impl Default for LineSettings {
             paths: RayKinds::CAMERA.union(RayKinds::REFLECTION).union(RayKinds::REFRACTION),
             tint: true,
             compose: Composition::Replace,
+            types: [TypeStyle::default(); LineType::ALL.len()],
             surfaces: 1,
             hidden: None,
         }

@@ -21,6 +21,7 @@ shaders![
     "lit_shadow",
     "mirror",
     "noise_width",
+    "pencil",
     "polygon_ids",
     "uv_lines",
 ];

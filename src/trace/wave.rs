@@ -17,12 +17,12 @@ use crate::clock::CpuClock;
 use crate::math::Vec3;
 use crate::plan::{Plan, marker};
 use crate::sample::position::SamplePositions;
-use crate::sample::{PixelRect, SampleBuffer, SampleBufferBuilder, SampleColor};
+use crate::sample::{PairBatch, PixelRect, SampleBuffer, SampleBufferBuilder, SampleColor};
 use crate::scene::Scene;
-use crate::scene::ids::ObjectId;
+use crate::scene::ids::{MaterialId, ObjectId};
 use crate::scene::settings::{Background, RayKinds};
 use crate::shade::batch::{HitBatch, OutputBatch};
-use crate::shade::{InputSet, Lighting, OutputSet, PathKind, ShadeErrors, Shaders, Shading};
+use crate::shade::{InputSet, Lighting, LineStyles, OutputSet, PathKind, ShadeErrors, Shaders, Shading};
 
 /// Samples of a run of pixels that are traced together.
 const RUN_SAMPLES: usize = 4096;
@@ -112,6 +112,11 @@ impl<'a> TraceContext<'a> {
             outputs: OutputBatch::default(),
             run: Run::default(),
         }
+    }
+
+    /// Styles lines of a material whose shader has a `line`.
+    pub fn style_lines(&mut self, material: MaterialId, pairs: &PairBatch, styles: &mut LineStyles) {
+        self.shading.style(material, pairs, styles, &mut self.errors);
     }
 
     /// Script evaluations so far.

@@ -31,6 +31,7 @@ const COLUMNS: NodeColumnSet = NodeColumnSet {
     lines: true,
     member: false,
     overlap: false,
+    position: false,
     throughput: false,
     contribution: false,
 };
@@ -102,7 +103,7 @@ fn measure(width: f32, samples_per_pixel: u32, options: Options) {
         let target = LineTile { buffer: &crop, bounds: &bounds };
         brute_samples += crop.samples() as f64;
         brute += seconds(|| {
-            brute_pairs += find_lines(&tiles.window(), target, &rules, Method::Brute).counts.pairs_tested;
+            brute_pairs += find_lines(&tiles.window(), target, &rules, Method::Brute, None).counts.pairs_tested;
         });
     }
 

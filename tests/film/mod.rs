@@ -50,6 +50,7 @@ impl Samples {
                 let tests = [
                     Fired::MISS | Fired::OBJECT,
                     Fired::OBJECT,
+                    Fired::OVERLAP,
                     Fired::SHADER,
                     Fired::NORMAL,
                     Fired::UV,
@@ -116,7 +117,7 @@ impl Samples {
             .enumerate()
             .filter_map(|(sample, &(x, y, s))| Some((sample as u32, (self.line)(x, y, s)?)))
             .unzip();
-        (buffer, LineBuffer { rect, samples, lines, counts: LineCounts::default() })
+        (buffer, LineBuffer { rect, samples, lines, counts: LineCounts::default(), gate: Vec::new() })
     }
 
     /// The whole picture in tiles.

@@ -118,6 +118,20 @@ fn a_placement_reaches_every_object() {
 }
 
 #[test]
+fn groups_come_from_the_placement_else_from_the_nodes() {
+    let mut model = Model::triangle();
+    model.json["nodes"][0]["extras"] = json!({ "tusche": { "group": "wheels" } });
+    model.root(json!({ "mesh": 0 }));
+    let groups = |placement: &Placement| {
+        let (scene, _) = model.try_import(ModelTime::Rest, placement).unwrap();
+        scene.objects.into_iter().map(|object| object.group).collect::<Vec<_>>()
+    };
+    assert_eq!(groups(&Placement::named("m")), [Some("wheels".to_owned()), None]);
+    let car = Some("car".to_owned());
+    assert_eq!(groups(&Placement { group: car.clone(), ..Placement::named("m") }), [car.clone(), car]);
+}
+
+#[test]
 fn importing_twice_into_one_scene() {
     let model = Model::triangle();
     let mut scene = SceneBuilder::default();

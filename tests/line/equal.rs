@@ -5,7 +5,9 @@ use tusche::line::{LineBuffer, Method, Rules, SeenLine};
 use tusche::math::Vec3;
 use tusche::sample::{HandMadeSample, Node, NodePath, PixelRect, SampleBuffer, SampleColor};
 use tusche::scene::ids::ObjectId;
-use tusche::scene::settings::{Composition, HiddenLines, LineOverrides, LineSettings, RayKinds};
+use tusche::scene::settings::{
+    Composition, HiddenLines, LineOverrides, LineSettings, LineType, RayKinds, TypeStyle,
+};
 
 use super::picture::{Tiles, layout};
 
@@ -25,6 +27,8 @@ struct Case {
     tiles: [i32; 2],
     settings: LineSettings,
     overrides: Vec<LineOverrides>,
+    /// Materials whose lines a script styles.
+    scripted: Vec<bool>,
     samples: Vec<Sample>,
 }
 
@@ -112,30 +116,47 @@ fn settings() -> impl Strategy<Value = LineSettings> {
     (
         (any::<bool>(), any::<bool>(), threshold(&[0.0, 0.25, 0.4]), threshold(&[0.0, 1.0, 90.0, 179.9, 180.0])),
         (threshold(&[0.0, 0.25, 0.3]), few([0.0, 0.5, 1.0]), any::<bool>(), few([1.0, 3.0, 5.0, 20.0])),
-        (any::<bool>(), any::<bool>(), 0..8u8, few([1, 1, 2, 3, 4]), hidden(), threshold(&[0.0, 0.5, 1.0, 2.0])),
+        (any::<bool>(), any::<bool>(), 0..8u8, threshold(&[0.0, 0.5, 1.0, 2.0]), few([1, 1, 2, 3, 4]), hidden()),
+        types(),
     )
-        .prop_map(|((object, shader, uv, normal), (feature, min_width, width_compensation, max_width), rest)| {
-            LineSettings {
-                object,
-                shader,
-                uv,
-                normal,
-                feature,
-                overlap: rest.5,
-                min_width,
-                width_compensation,
-                max_width,
-                tint: rest.0,
-                compose: if rest.1 { Composition::Replace } else { Composition::Throughput },
-                // Mostly all: 3 of 8 leave kinds out.
-                paths: if rest.2 < 3 { RayKinds::from_bits_truncate(rest.2 + 1) } else { RayKinds::all() },
-                enabled: true,
-                color: Vec3::ZERO,
-                width: 2.0,
-                surfaces: rest.3,
-                hidden: rest.4,
-            }
-        })
+        .prop_map(
+            |((object, shader, uv, normal), (feature, min_width, width_compensation, max_width), rest, types)| {
+                LineSettings {
+                    object,
+                    shader,
+                    uv,
+                    normal,
+                    feature,
+                    overlap: rest.3,
+                    min_width,
+                    width_compensation,
+                    max_width,
+                    tint: rest.0,
+                    compose: if rest.1 { Composition::Replace } else { Composition::Throughput },
+                    // Mostly all: 3 of 8 leave kinds out.
+                    paths: if rest.2 < 3 { RayKinds::from_bits_truncate(rest.2 + 1) } else { RayKinds::all() },
+                    enabled: true,
+                    color: Vec3::ZERO,
+                    width: 2.0,
+                    types,
+                    surfaces: rest.4,
+                    hidden: rest.5,
+                }
+            },
+        )
+}
+
+/// What types change: mostly nothing.
+fn types() -> impl Strategy<Value = [TypeStyle; LineType::ALL.len()]> {
+    let one = (
+        few([None, None, None, Some(0.0), Some(0.3), Some(1.5), Some(4.0), Some(1e9)]),
+        few([None, None, Some(0.0), Some(0.5), Some(1.0)]),
+        few([None, None, Some(Vec3::new(0.25, 0.5, 1.0))]),
+    );
+    let one = one.prop_map(|(width, opacity, color)| TypeStyle { color, width, opacity });
+    let all = proptest::collection::vec(one, LineType::ALL.len());
+    let all = all.prop_map(|all| std::array::from_fn(|index| all[index]));
+    prop_oneof![2 => Just([TypeStyle::default(); LineType::ALL.len()]), 1 => all]
 }
 
 /// What materials change, for fewer or more materials than there are.
@@ -172,33 +193,40 @@ fn case() -> impl Strategy<Value = Case> {
             let palette = proptest::collection::vec(sample(), 1..8);
             let choice = proptest::collection::vec((0..8usize, 1..40usize), count.min(60));
             let offsets = proptest::collection::vec([0.0..1.0f32, 0.0..1.0f32], count);
-            (palette, choice, offsets, any::<bool>()).prop_map(move |(palette, choice, offsets, jitter)| {
-                let runs = choice.iter().flat_map(|&(entry, length)| std::iter::repeat_n(entry, length)).cycle();
-                let samples = runs
-                    .zip(&offsets)
-                    .map(|(entry, &offset)| {
-                        let sample = palette[entry % palette.len()].clone();
-                        if jitter { Sample { offset, ..sample } } else { sample }
-                    })
-                    .collect();
-                let (settings, overrides) = (settings.clone(), overrides.clone());
-                Case { rect, samples_per_pixel, tiles, settings, overrides, samples }
-            })
+            let scripted = few([vec![], vec![], vec![true, false], vec![false, true], vec![true, true]]);
+            (palette, choice, offsets, any::<bool>(), scripted).prop_map(
+                move |(palette, choice, offsets, jitter, scripted)| {
+                    let runs = choice.iter().flat_map(|&(entry, length)| std::iter::repeat_n(entry, length)).cycle();
+                    let samples = runs
+                        .zip(&offsets)
+                        .map(|(entry, &offset)| {
+                            let sample = palette[entry % palette.len()].clone();
+                            if jitter { Sample { offset, ..sample } } else { sample }
+                        })
+                        .collect();
+                    let (settings, overrides) = (settings.clone(), overrides.clone());
+                    Case { rect, samples_per_pixel, tiles, settings, overrides, scripted, samples }
+                },
+            )
         })
 }
 
 /// In few words: proptest prints a case as often as it shrinks.
 impl std::fmt::Debug for Case {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Self { rect, samples_per_pixel, tiles, settings, overrides, samples } = self;
-        writeln!(f, "{rect:?}, {samples_per_pixel} samples, tiles of {tiles:?}\n{settings:?}\n{overrides:?}")?;
+        let Self { rect, samples_per_pixel, tiles, settings, overrides, scripted, samples } = self;
+        writeln!(
+            f,
+            "{rect:?}, {samples_per_pixel} samples, tiles of {tiles:?}\n{settings:?}\n{overrides:?}\nscripts: {scripted:?}"
+        )?;
         samples.iter().try_for_each(|sample| writeln!(f, "{sample:?}"))
     }
 }
 
 impl Case {
     fn rules(&self) -> Rules {
-        Rules::new(&self.settings, self.samples_per_pixel).with_materials(&self.overrides)
+        let rules = Rules::new(&self.settings, self.samples_per_pixel);
+        rules.with_materials(&self.overrides).with_scripts(&self.scripted)
     }
 
     fn cut(&self, side: i32, rules: Rules) -> Tiles {

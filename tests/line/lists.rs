@@ -63,7 +63,7 @@ fn lines_of(lists: &[&[Node]], through: &[(usize, Node)], settings: &LineSetting
     let bounds = TileBounds::new(&buffer, &rules);
     let tile = LineTile { buffer: &buffer, bounds: &bounds };
     let [exact, brute] = [Method::Exact, Method::Brute].map(|method| {
-        let mut lines = find_lines(&Window::single(tile), tile, &rules, method);
+        let mut lines = find_lines(&Window::single(tile), tile, &rules, method, None);
         lines.counts.pairs_tested = 0;
         lines
     });

@@ -1,8 +1,8 @@
 //! Pictures without a ray tracer: a function from the film to nodes, sampled as the renderer samples.
 
-use tusche::line::{LineBuffer, LineTile, Method, Rules, TileBounds, Window, find_lines};
+use tusche::line::{LineBuffer, LineScripts, LineTile, Method, Rules, TileBounds, Window, find_lines};
 use tusche::sample::position::SamplePositions;
-use tusche::sample::{HandMadeSample, Node, NodeColumnSet, NodePath, PixelRect, SampleBuffer, SampleLayout};
+use tusche::sample::{HandMadeSample, Node, NodeColumnSet, NodePath, PairBatch, PixelRect, SampleBuffer, SampleLayout};
 use tusche::scene::settings::LineSettings;
 
 /// Everything a buffer can keep.
@@ -25,6 +25,31 @@ pub fn sampled(rect: PixelRect, layout: &SampleLayout, node: &dyn Fn([f32; 2]) -
     let samples: Vec<_> =
         nodes.iter().map(|(offset, nodes)| HandMadeSample { offset: *offset, nodes, ..Default::default() }).collect();
     SampleBuffer::from_samples(rect, layout, &samples)
+}
+
+/// Styles lines by all that is told of them: what differs by a bit looks different.
+struct AnyScript;
+
+impl LineScripts for AnyScript {
+    fn style(&mut self, shader: u32, pairs: &mut PairBatch, styles: &mut Vec<(Option<[f32; 3]>, f32)>) {
+        for row in 0..pairs.len {
+            let mut all = format!("{shader} {:?} {} {}", pairs.kind[row], pairs.path[row], pairs.own[row]);
+            let floats = [pairs.distance[row], pairs.width[row], pairs.opacity[row]].into_iter();
+            for x in floats.chain(pairs.color[row]).chain(pairs.pixel[row]) {
+                all += &format!(" {:x}", x.to_bits());
+            }
+            for side in &pairs.sides {
+                all += &format!(" {} {} {:x}", side.object[row], side.material[row], side.depth[row].to_bits());
+                all += &format!(" {:?} {:?} {:?}", side.position[row], side.normal[row], side.feature[row]);
+            }
+            let hash = all.bytes().fold(14_695_981_039_346_656_037_u64, |hash, byte| {
+                (hash ^ u64::from(byte)).wrapping_mul(1_099_511_628_211)
+            });
+            let opacity = [0.0, 1.0, 0.25, f32::NAN, 2.0, -1.0, 0.5, 0.75][(hash >> 20) as usize % 8];
+            let color = [(hash >> 40) as f32, (hash >> 50) as f32, f32::INFINITY];
+            styles.push(((hash >> 10).is_multiple_of(3).then_some(color), opacity));
+        }
+    }
 }
 
 /// A picture in tiles, ready for the line pass.
@@ -67,7 +92,7 @@ impl Tiles {
 
     /// The lines of one tile.
     pub fn lines_of(&self, index: usize, method: Method) -> LineBuffer {
-        find_lines(&self.window(), self.tile(index), &self.rules, method)
+        find_lines(&self.window(), self.tile(index), &self.rules, method, Some(&mut AnyScript))
     }
 
     /// The lines of all tiles, in order.
@@ -88,26 +113,39 @@ impl Tiles {
     }
 }
 
-/// The area that lines cover in a rectangle, in square pixels: the mean of their alpha over the samples. Samples are
-/// taken beyond it too, so its border does not matter.
+/// The part of each pixel of a rectangle that lines cover, row by row: the mean of their alpha over its samples. Samples
+/// are taken beyond it too, so its border does not matter.
+#[allow(dead_code, reason = "the benchmark does not ask")]
+pub fn covered_by_pixel(
+    rect: PixelRect,
+    settings: &LineSettings,
+    samples_per_pixel: u32,
+    node: &dyn Fn([f32; 2]) -> Node,
+) -> Vec<f64> {
+    let rules = Rules::new(settings, samples_per_pixel);
+    let layout = layout(samples_per_pixel, settings.max_width);
+    let sampled_rect = rect.grown(rules.reach());
+    let tiles = Tiles::new(sampled_rect, 32, &rules, |tile| sampled(tile, &layout, node));
+    let mut covered = vec![0.0; rect.pixels()];
+    for ((buffer, _), lines) in tiles.tiles.iter().zip(tiles.lines(Method::Exact)) {
+        for (&sample, line) in lines.samples.iter().zip(&lines.lines) {
+            let [x, y] = buffer.pixel_of(sample);
+            if rect.contains(x, y) {
+                let pixel = (y - rect.y0) as usize * rect.width() as usize + (x - rect.x0) as usize;
+                covered[pixel] += f64::from(line.alpha) / f64::from(samples_per_pixel);
+            }
+        }
+    }
+    covered
+}
+
+/// The area that lines cover in a rectangle, in square pixels.
+#[allow(dead_code, reason = "the benchmark does not ask")]
 pub fn covered_area(
     rect: PixelRect,
     settings: &LineSettings,
     samples_per_pixel: u32,
     node: &dyn Fn([f32; 2]) -> Node,
 ) -> f64 {
-    let rules = Rules::new(settings, samples_per_pixel);
-    let layout = layout(samples_per_pixel, settings.max_width);
-    let sampled_rect = rect.grown(rules.reach());
-    let tiles = Tiles::new(sampled_rect, 32, &rules, |tile| sampled(tile, &layout, node));
-    let mut alpha = 0.0;
-    for ((buffer, _), lines) in tiles.tiles.iter().zip(tiles.lines(Method::Exact)) {
-        for (&sample, line) in lines.samples.iter().zip(&lines.lines) {
-            let [x, y] = buffer.pixel_of(sample);
-            if rect.contains(x, y) {
-                alpha += f64::from(line.alpha);
-            }
-        }
-    }
-    alpha / f64::from(samples_per_pixel)
+    covered_by_pixel(rect, settings, samples_per_pixel, node).iter().sum()
 }

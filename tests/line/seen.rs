@@ -35,7 +35,7 @@ fn lines_of(samples: &[(f32, &[(NodePath, Node)])], settings: &LineSettings) -> 
     let bounds = TileBounds::new(&buffer, &rules);
     let tile = LineTile { buffer: &buffer, bounds: &bounds };
     let [exact, brute] = [Method::Exact, Method::Brute].map(|method| {
-        let mut lines = find_lines(&Window::single(tile), tile, &rules, method);
+        let mut lines = find_lines(&Window::single(tile), tile, &rules, method, None);
         lines.counts.pairs_tested = 0;
         lines
     });
@@ -216,6 +216,7 @@ fn the_strongest_reason_names_the_line() {
     let order = [
         (Fired::MISS, LineType::Outline),
         (Fired::OBJECT, LineType::Silhouette),
+        (Fired::OVERLAP, LineType::Overlap),
         (Fired::SHADER, LineType::Material),
         (Fired::NORMAL, LineType::Crease),
         (Fired::UV, LineType::Uv),

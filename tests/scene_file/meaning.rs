@@ -11,7 +11,7 @@ use tusche::scene::ids::ObjectId;
 use tusche::scene::light::LightKind;
 use tusche::scene::material::ParamValue;
 use tusche::scene::settings::{
-    Background, Composition, FilterKind, HiddenLines, LineSettings, RayKinds, RenderSettings,
+    Background, Composition, FilterKind, HiddenLines, LineSettings, LineType, RayKinds, RenderSettings, TypeStyle,
 };
 use tusche::scene::shape::Shape;
 use tusche::scene::texture::{Pixels, TextureFilter, Wrap};
@@ -66,6 +66,13 @@ fn every_setting_is_taken_over() {
             paths: RayKinds::CAMERA | RayKinds::REFRACTION,
             tint: false,
             compose: Composition::Throughput,
+            types: LineType::ALL.map(|kind| match kind {
+                LineType::Crease => {
+                    TypeStyle { color: Some(Vec3::new(0.2, 0.1, 0.0)), width: Some(1.5), opacity: Some(0.75) }
+                }
+                LineType::Outline => TypeStyle { width: Some(6.0), ..TypeStyle::default() },
+                _ => TypeStyle::default(),
+            }),
             surfaces: 3,
             hidden: Some(HiddenLines {
                 color: Vec3::new(0.2, 0.3, 0.4),

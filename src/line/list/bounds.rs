@@ -62,9 +62,9 @@ impl LayerBounds {
                     pixels.facets.push(FacetBounds::of(rows.map(|row| Facet::of(nodes, row))));
                 }
             }
-            blocks.push_union(&pixels, first, nodes);
+            blocks.push_union(&pixels, first, nodes, rules);
         }
-        whole.push_union(&blocks, 0, nodes);
+        whole.push_union(&blocks, 0, nodes, rules);
         Self { radius_squared, whole, blocks, pixels }
     }
 
@@ -80,11 +80,11 @@ impl LayerBounds {
 
 impl Parts {
     /// Appends the bounds of all of some parts from the one at `first` on.
-    fn push_union(&mut self, of: &Self, first: usize, nodes: &NodeColumns) {
+    fn push_union(&mut self, of: &Self, first: usize, nodes: &NodeColumns, rules: &Rules) {
         let empty = Part { bounds: Bounds::EMPTY, every: true };
         self.parts.push(of.parts[first..].iter().fold(empty, |all, one| {
             let present = one.bounds.object[0] <= one.bounds.object[1];
-            let bounds = if present { all.bounds.union(&one.bounds, nodes) } else { all.bounds };
+            let bounds = if present { all.bounds.union(&one.bounds, nodes, rules) } else { all.bounds };
             Part { bounds, every: all.every && one.every }
         }));
         if !of.shapes.is_empty() {

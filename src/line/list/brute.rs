@@ -1,10 +1,10 @@
 //! The definition as plain loops, to be read beside the head of [`super`]. The oracle of [`super::search`].
 
-use super::{Kind, List, Search, Surface, push_list};
+use super::{Kind, List, Search, Surface, is_opaque, push_list};
 use crate::line::LineCounts;
 use crate::line::differ::Features;
 use crate::line::pair::{Found, MOST_LINES, Pair, Taken, distance_squared};
-use crate::line::window::{PathTile, alpha, features};
+use crate::line::window::{PathTile, features};
 use crate::sample::PixelRect;
 
 /// The line that each target sees which is not `skipped`, by its sample.
@@ -24,9 +24,7 @@ pub(in crate::line) fn find(search: &Search<'_, '_>, skipped: &[bool], counts: &
             pairs.push(pair);
             // Through a line that is not opaque, the next is seen.
             let Some(neighbors) = &window.tiles[pair.tile as usize] else { break };
-            let (tile, of) = if pair.own { (targets, row) } else { (neighbors, pair.row as usize) };
-            let Some((nodes, styling)) = tile.surface(of, pair.surface) else { break };
-            if alpha(nodes, styling, rules) >= 1.0 {
+            if is_opaque(rules, (targets, row), neighbors, &pair) {
                 break;
             }
             taken.take(&other_side(neighbors, &pair), pair.own);
@@ -76,12 +74,12 @@ fn seen(search: &Search<'_, '_>, row: usize, taken: &Taken, counts: &mut LineCou
                         for (place, s) in (0..).zip(n.surfaces) {
                             let differs = if place == 0 { s.differs(&t1, d, rules) } else { t.lacks(s, d, rules) };
                             if s.rank.outranks(t1.rank) && differs && !taken.contains(&s.features, false) {
-                                at.consider(s, s.radius_squared, place, false, &mut seen);
+                                at.consider(s, s.radius_squared_beside(&t1, d, rules), place, false, &mut seen);
                             }
                         }
                         let own = !n1.rank.outranks(t1.rank) && t1.differs(&n1, d, rules);
                         if (own || n.lacks(&t1, d, rules)) && !taken.contains(&n1.features, true) {
-                            at.consider(&t1, t1.radius_squared, 0, true, &mut seen);
+                            at.consider(&t1, t1.radius_squared_beside(&n1, d, rules), 0, true, &mut seen);
                         }
                     }
                     Kind::Hidden => {

@@ -13,7 +13,8 @@
 //!
 //! Of all these the seen one minimises −priority, depth, distance, index of n, place in n's list, as in section 3.2.
 //!
-//! Whether two surfaces differ is decided by the tests of the material of the one that would draw.
+//! Whether two surfaces differ is decided by the tests of the material of the one that would draw. A line's type is that of
+//! the differences between the surface that draws it and the first of the other side.
 //!
 //! So lists add lines and take none away. The text can be read as if 3.2 held no more for K > 1; then two objects that
 //! cut each other would lose the line along the cut, since each goes on inside the other and is in both lists; and so would
@@ -39,9 +40,9 @@ pub(super) mod search;
 
 use super::differ::{Features, Tests};
 use super::overlap::Facet;
-use super::pair::{Found, Rank};
-use super::window::{PathTile, PathWindow, features};
-use super::{Fired, Rules};
+use super::pair::{Pair, Rank};
+use super::window::{PathTile, PathWindow, alpha, features};
+use super::{Fired, LineType, Rules};
 use crate::sample::{Column, NodeColumns};
 
 /// Which lines are looked for.
@@ -67,7 +68,7 @@ pub(super) struct Search<'w, 'a> {
 pub(super) struct Surface {
     pub features: Features,
     pub rank: Rank,
-    /// Square of the radius of its line, 0 if it draws none.
+    /// Square of the radius of its line but for what types change, 0 if it draws none.
     pub radius_squared: f32,
     /// Where the overlap test reads it.
     pub facet: Facet,
@@ -91,6 +92,24 @@ impl Surface {
         let (a, b) = (&self.features, &other.features);
         let tests = rules.tests_of(a.shader);
         tests.differ(a, b) || (tests.reads_facets() && self.overlaps(other, distance_squared, tests))
+    }
+
+    /// Which of its material's tests find a difference.
+    #[inline]
+    fn fired(&self, other: &Self, distance_squared: f32, rules: &Rules) -> Fired {
+        let tests = rules.tests_of(self.features.shader);
+        let mut fired = tests.fired(&self.features, &other.features);
+        fired.set(Fired::OVERLAP, tests.reads_facets() && self.overlaps(other, distance_squared, tests));
+        fired
+    }
+
+    /// The squared radius of its line beside the first surface of another ray; the line's type may have changed it.
+    #[inline]
+    fn radius_squared_beside(&self, other: &Self, distance_squared: f32, rules: &Rules) -> f32 {
+        let asked_squared = self.radius_squared;
+        rules.types().map_or(asked_squared, |types| {
+            types.radius_squared_of(self.fired(other, distance_squared, rules), asked_squared)
+        })
     }
 
     #[inline]
@@ -159,16 +178,32 @@ pub(super) fn push_list(tile: &PathTile<'_>, row: usize, rules: &Rules, surfaces
 
 /// Which tests find a difference between the two sides of a line: the surface that draws it, and the first of the other
 /// sample.
-pub(super) fn fired(rules: &Rules, targets: &PathTile<'_>, found: &Found, neighbors: &PathTile<'_>) -> Option<Fired> {
-    let (pair, mut lists) = (&found.pair, Vec::new());
-    push_list(targets, found.row, rules, &mut lists);
+pub(super) fn fired(
+    rules: &Rules,
+    (targets, target): (&PathTile<'_>, usize),
+    neighbors: &PathTile<'_>,
+    pair: &Pair,
+) -> Option<Fired> {
+    let mut lists = Vec::new();
+    push_list(targets, target, rules, &mut lists);
     let mine = *lists.get(if pair.own { pair.surface as usize } else { 0 })?;
     lists.clear();
     push_list(neighbors, pair.row as usize, rules, &mut lists);
     let theirs = *lists.get(if pair.own { 0 } else { pair.surface as usize })?;
-    let tests = rules.tests_of(if pair.own { &mine } else { &theirs }.features.shader);
-    let mut fired = tests.fired(&mine.features, &theirs.features);
-    let overlaps = tests.reads_facets() && mine.overlaps(&theirs, pair.distance_squared, tests);
-    fired.set(Fired::OVERLAP, overlaps);
-    Some(fired)
+    let (drawing, other) = if pair.own { (mine, theirs) } else { (theirs, mine) };
+    Some(drawing.fired(&other, pair.distance_squared, rules))
+}
+
+/// Whether nothing is seen through the line of a pair.
+pub(super) fn is_opaque(
+    rules: &Rules,
+    (targets, target): (&PathTile<'_>, usize),
+    neighbors: &PathTile<'_>,
+    pair: &Pair,
+) -> bool {
+    let (tile, row) = if pair.own { (targets, target) } else { (neighbors, pair.row as usize) };
+    let Some((nodes, row)) = tile.surface(row, pair.surface) else { return true };
+    let kind = rules.types().and_then(|_| LineType::of(fired(rules, (targets, target), neighbors, pair)?));
+    // What a script makes of it is not known yet.
+    !rules.is_scripted(nodes.shader.get(row)) && alpha(nodes, row, kind, rules) >= 1.0
 }

@@ -14,13 +14,13 @@
 
 use super::bounds::Lists;
 use super::brute::other_side;
-use super::{Kind, List, Search, Surface, draws_at, draws_own, push_list};
-use crate::line::LineCounts;
+use super::{Kind, List, Search, Surface, draws_at, draws_own, is_opaque, push_list};
+use crate::line::{LineCounts, Rules};
 use crate::line::bounds::{Bounded, Stylist};
 use crate::line::materials::may_differ;
 use crate::line::pair::{Found, LineNode, MOST_LINES, Pair, Rank, Taken, distance_squared};
 use crate::line::search::{pixel_gap_squared, pixel_rect, rect_gap_squared};
-use crate::line::window::{LineStyle, PathTile, alpha, style};
+use crate::line::window::{LineStyle, PathTile, style};
 
 /// The line that each target sees which is not `skipped`, in no particular order.
 pub(in crate::line) fn find(search: &Search<'_, '_>, skipped: &[bool], counts: &mut LineCounts) -> Vec<Found> {
@@ -119,6 +119,8 @@ struct Neighbor {
 struct Target {
     row: usize,
     node: LineNode,
+    /// The squared radius of the widest line of its own, of any type.
+    reach_squared: f32,
     list: Neighbor,
     /// The style of its own line, if that is opaque.
     style: Option<LineStyle>,
@@ -178,7 +180,7 @@ impl<'w, 'a> Scratch<'w, 'a> {
                         sight.best = sight.best.better(s.bounds.best);
                         sight.radius_squared = sight.radius_squared.max(s.bounds.radius_squared);
                         if self.any_pair {
-                            sight.style = sight.style.and(styles(tile, place, s.bounds.stylist));
+                            sight.style = sight.style.and(styles(tile, place, s.bounds.stylist, rules));
                         }
                     }
                 }
@@ -276,8 +278,9 @@ impl<'w, 'a> Scratch<'w, 'a> {
             let row = list.row as usize;
             if !skipped[targets.nodes.rows.sample(row) as usize] {
                 let node = targets.node(pixel.pixel, row);
-                let style = Some(targets.style(row)).filter(|style| style.is_opaque(rules));
-                self.targets.push(Target { row, node, list, style, best: None, settled: false });
+                let reach_squared = rules.widest_squared(node.radius_squared);
+                let style = Some(targets.style(row, rules)).filter(|style| style.is_opaque(rules));
+                self.targets.push(Target { row, node, reach_squared, list, style, best: None, settled: false });
             }
         }
         if self.targets.is_empty() {
@@ -358,7 +361,7 @@ impl<'w, 'a> Scratch<'w, 'a> {
                     return false;
                 }
                 let gap_squared = gap_squared(&target.node, pixel);
-                gap_squared < target.node.radius_squared
+                gap_squared < target.reach_squared
                     && target.best.is_none_or(|best| best.distance_squared >= gap_squared)
             };
             if !targets.iter().any(open) {
@@ -420,14 +423,7 @@ impl<'w, 'a> Scratch<'w, 'a> {
         let mut last = first;
         while behind.len() + 1 < MOST_LINES {
             let Some(neighbors) = &window.tiles[last.tile as usize] else { break };
-            let row = self.targets[target].row;
-            let styled = if last.own {
-                tile.surface(row, last.surface)
-            } else {
-                neighbors.surface(last.row as usize, last.surface)
-            };
-            let Some((nodes, styling)) = styled else { break };
-            if alpha(nodes, styling, rules) >= 1.0 {
+            if is_opaque(rules, (tile, self.targets[target].row), neighbors, &last) {
                 break;
             }
             taken.take(&other_side(neighbors, &last), last.own);
@@ -504,12 +500,13 @@ impl<'w, 'a> Scratch<'w, 'a> {
         let distance_squared = distance_squared(&target.node, pixel, n.offset);
         let rules = self.search.rules;
         for (place, s) in (0..).zip(self.list(n).surfaces) {
-            if distance_squared >= s.radius_squared {
+            if distance_squared >= rules.widest_squared(s.radius_squared) {
                 continue;
             }
             let pair = Pair { rank: s.rank, distance_squared, pixel, tile, row: n.row, surface: place, own: false };
             if target.best.is_none_or(|best| pair.beats(&best))
                 && draws_at(&self.list(&target.list), s, place, distance_squared, rules)
+                && distance_squared < s.radius_squared_beside(self.list(&target.list).first(), distance_squared, rules)
                 && !taken.is_some_and(|taken| taken.contains(&s.features, false))
             {
                 target.best = Some(pair);
@@ -521,13 +518,15 @@ impl<'w, 'a> Scratch<'w, 'a> {
     #[inline]
     fn see_own(&self, target: &mut Target, n: &Neighbor, pixel: [i32; 2], tile: u32, taken: Option<&Taken>) {
         let distance_squared = distance_squared(&target.node, pixel, n.offset);
-        if distance_squared >= target.node.radius_squared {
+        if distance_squared >= target.reach_squared {
             return;
         }
-        let (list, rank) = (self.list(n), target.node.rank);
+        let (list, rank, rules) = (self.list(n), target.node.rank, self.search.rules);
+        let t = self.list(&target.list);
         let pair = Pair { rank, distance_squared, pixel, tile, row: n.row, surface: 0, own: true };
         if target.best.is_none_or(|best| pair.beats(&best))
-            && draws_own(&self.list(&target.list), &list, distance_squared, self.search.rules)
+            && draws_own(&t, &list, distance_squared, rules)
+            && distance_squared < t.first().radius_squared_beside(list.first(), distance_squared, rules)
             && !taken.is_some_and(|taken| taken.contains(&list.first().features, true))
         {
             target.best = Some(pair);
@@ -589,11 +588,11 @@ fn gap_squared(target: &LineNode, pixel: [i32; 2]) -> f32 {
 }
 
 /// The styles of the lines at a place of the lists of a tile, by who has it.
-fn styles(tile: &PathTile<'_>, place: usize, stylist: Stylist) -> Styles {
+fn styles(tile: &PathTile<'_>, place: usize, stylist: Stylist, rules: &Rules) -> Styles {
     let nodes = place.checked_sub(1).map_or(tile.nodes, |behind| &tile.nodes.behind[behind]);
     match stylist {
         Stylist::None => Styles::None,
-        Stylist::Alike(row) => Styles::One(style(nodes, row as usize)),
+        Stylist::Alike(row) => Styles::One(style(nodes, row as usize, rules)),
         Stylist::Many => Styles::Many,
     }
 }

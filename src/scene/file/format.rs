@@ -253,6 +253,8 @@ pub(super) struct Lines {
     pub tint: bool,
     /// How lines in reflections and refractions enter the picture.
     pub compose: Compose,
+    /// What types of lines change about what their shaders ask for.
+    pub types: LineTypes,
     /// How many surfaces along a ray take part in the tests. With 1, a line is lost where an object that draws none covers
     /// what would tell of it. While only objects and materials are compared, an object counts once for each material,
     /// where the ray first meets it; else each time the ray meets it.
@@ -279,6 +281,7 @@ impl Default for Lines {
             paths: vec![LinePath::Camera, LinePath::Reflection, LinePath::Refraction],
             tint: true,
             compose: Compose::Replace,
+            types: LineTypes::default(),
             surfaces: 1,
             hidden: None,
         }
@@ -303,6 +306,40 @@ impl Default for HiddenLines {
     fn default() -> Self {
         Self { color: Color([0.5; 3]), width: 1.0, objects: None }
     }
+}
+
+/// Styles by the strongest reason why a line is there.
+#[derive(Debug, Default, Deserialize, Serialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub(super) struct LineTypes {
+    /// Lines along the background.
+    pub outline: LineTypeStyle,
+    /// Lines between objects.
+    pub silhouette: LineTypeStyle,
+    /// Lines where an object folds over itself.
+    pub overlap: LineTypeStyle,
+    /// Lines between materials.
+    pub material: LineTypeStyle,
+    /// Lines where normals differ.
+    pub crease: LineTypeStyle,
+    /// Lines where texture coordinates differ.
+    pub uv: LineTypeStyle,
+    /// Lines where feature colours differ.
+    pub feature: LineTypeStyle,
+}
+
+/// What a type of line changes; what is left out stays as the shader gives it.
+#[derive(Clone, Copy, Debug, Default, Deserialize, Serialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub(super) struct LineTypeStyle {
+    /// Colour.
+    pub color: Option<Color>,
+    /// Full width in pixels; 0 draws none of this type. Surfaces whose own lines are 0 wide draw none of any type.
+    #[schemars(range(min = 0, max = MAX_LINE_WIDTH))]
+    pub width: Option<f64>,
+    /// Multiplies the opacity.
+    #[schemars(range(min = 0, max = 1))]
+    pub opacity: Option<f64>,
 }
 
 /// A line test: `false`, or the difference from which on it draws.

@@ -5,7 +5,7 @@ use gltf::json::camera::Type;
 use gltf::json::validation::Checked;
 
 use super::report::Report;
-use crate::math::{DAffine3, DMat3};
+use crate::math::{DAffine3, DMat3, DVec2};
 use crate::scene::camera::{Camera, Projection};
 
 /// The camera of a node, if it has one. Scale does not matter to cameras. The aspect ratio and the clipping planes are
@@ -38,9 +38,13 @@ pub(super) fn of_node(
         _ => return report.fail(place, "its type does not fit its properties"),
     };
     match axes(world_from_node) {
-        Some(world_from_camera) => {
-            Some(Camera { name, projection, position: world_from_node.translation, world_from_camera })
-        }
+        Some(world_from_camera) => Some(Camera {
+            name,
+            projection,
+            position: world_from_node.translation,
+            world_from_camera,
+            film_shift: DVec2::ZERO,
+        }),
         None => {
             report.warning(format!("nodes[{node}]"), "its camera has no direction (a scale of 0) and cannot be used");
             None

@@ -10,7 +10,8 @@ use crate::math::Vec3;
 use crate::scene::check::MAX_PIXELS;
 use crate::scene::ids::ObjectId;
 use crate::scene::settings::{
-    Background, Composition, FilterKind, HiddenLines, LineOverrides, LineSettings, RayKinds, RenderSettings,
+    Background, Composition, FilterKind, HiddenLines, LineOverrides, LineSettings, LineType, RayKinds, RenderSettings,
+    TypeStyle,
 };
 use crate::scene::texture::{Texture, TextureFilter, Wrap};
 
@@ -78,11 +79,16 @@ impl Resolver<'_> {
     pub(super) fn lines(&mut self, lines: &format::Lines) {
         let node = self.part("lines");
         self.check_angle(lines.normal, "lines.normal", node);
-        if lines.min_width > lines.max_width {
+        if lines.max_width == 0.0 {
+            if lines.width > 0.0 {
+                let warning = Diagnostic::warning("no lines are drawn: `max_width` is 0");
+                self.faults.push(warning.at(node.span_of("max_width")));
+            }
+        } else if lines.min_width > lines.max_width {
             let message = format!("`min_width` is {} and `max_width` only {}", lines.min_width, lines.max_width);
             self.fault(message, node.span_of("min_width"));
         }
-        if lines.width > lines.max_width {
+        if lines.width > lines.max_width && lines.max_width > 0.0 {
             let message = format!("lines are drawn {} pixels wide, as `max_width` says", lines.max_width);
             let warning = Diagnostic::warning(message).at(node.span_of("width"));
             self.faults.push(warning.hint(format!("set `max_width = {}`, too", lines.width)));
@@ -98,6 +104,7 @@ impl Resolver<'_> {
             let warning = Diagnostic::warning(message).at(node.get("hidden").unwrap_or(node).span_of("width"));
             self.faults.push(warning.hint(format!("set `max_width = {}` in [lines], too", hidden.width)));
         }
+        let types = self.line_types(lines, node);
         let paths = lines.paths.iter().map(|path| match path {
             format::LinePath::Camera => RayKinds::CAMERA,
             format::LinePath::Reflection => RayKinds::REFLECTION,
@@ -122,6 +129,7 @@ impl Resolver<'_> {
                 format::Compose::Replace => Composition::Replace,
                 format::Compose::Throughput => Composition::Throughput,
             },
+            types,
             surfaces: lines.surfaces,
             hidden: lines.hidden.as_ref().map(|hidden| HiddenLines {
                 color: rgb(hidden.color),
@@ -156,6 +164,32 @@ impl Resolver<'_> {
         if let Some(hidden) = &mut self.scene.lines.hidden {
             hidden.objects = Some(objects.into_iter().collect());
         }
+    }
+
+    /// In the order of [`LineType::ALL`].
+    fn line_types(&mut self, lines: &format::Lines, node: &Node) -> [TypeStyle; LineType::ALL.len()] {
+        let types = &lines.types;
+        LineType::ALL.map(|kind| {
+            let style = match kind {
+                LineType::Outline => &types.outline,
+                LineType::Silhouette => &types.silhouette,
+                LineType::Overlap => &types.overlap,
+                LineType::Material => &types.material,
+                LineType::Crease => &types.crease,
+                LineType::Uv => &types.uv,
+                LineType::Feature => &types.feature,
+            };
+            if style.width.is_some_and(|width| width > lines.max_width) {
+                let at = node.get("types").and_then(|types| types.get(kind.name())).unwrap_or(node);
+                let message = format!("lines are drawn {} pixels wide, as `max_width` says", lines.max_width);
+                self.faults.push(Diagnostic::warning(message).at(at.span_of("width")));
+            }
+            TypeStyle {
+                color: style.color.map(rgb),
+                width: style.width.map(|width| width as f32),
+                opacity: style.opacity.map(|opacity| opacity as f32),
+            }
+        })
     }
 
     /// What a material changes about the line tests; `path` names it in messages.
