@@ -153,8 +153,8 @@ fn rebuild(hidden: fn(i32, u32) -> bool) {
                 let tolerance = 5.0 / 2048.0 * rgba.abs().max(below.abs()).max(1.0);
                 assert!((over - rgba).abs() < tolerance, "{kind:?}, pixel {i}, channel {channel}: {over}, not {rgba}");
                 let sum = |layers: std::ops::Range<usize>| layers.map(|layer| value(layer, channel, i)).sum::<f32>();
-                assert!((sum(4..10) - value(1, channel, i)).abs() < 1e-5, "types, pixel {i}");
-                assert!((sum(10..13) - value(1, channel, i)).abs() < 1e-5, "paths, pixel {i}");
+                assert!((sum(4..11) - value(1, channel, i)).abs() < 1e-5, "types, pixel {i}");
+                assert!((sum(11..14) - value(1, channel, i)).abs() < 1e-5, "paths, pixel {i}");
             }
         }
     }
@@ -279,7 +279,7 @@ fn line_types_add_up_to_all_lines() {
     assert!(tile.channels[3].iter().any(|alpha| *alpha > 0.1));
     for i in 0..tile.rect.pixels() {
         for component in 0..4 {
-            let types: f32 = (1..7).map(|layer| tile.channels[4 * layer + component][i]).sum();
+            let types: f32 = (1..8).map(|layer| tile.channels[4 * layer + component][i]).sum();
             assert!((types - tile.channels[component][i]).abs() < 1e-5);
         }
     }

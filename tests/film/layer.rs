@@ -12,7 +12,7 @@ fn names_are_read_back() {
     let names: Vec<_> = Layer::FIXED.iter().map(ToString::to_string).collect();
     assert_eq!(
         names.join(" "),
-        "rgba color line line.outline line.silhouette line.material line.crease line.uv line.feature line.camera \
+        "rgba color line line.outline line.silhouette line.overlap line.material line.crease line.uv line.feature line.camera \
          line.reflection line.refraction line.hidden below Z N P uv object feature"
     );
 }
@@ -51,7 +51,7 @@ fn unknown_names_are_errors_with_the_nearest_name() {
     assert_eq!(
         error("beauty_pass", &["ink"]),
         "error: there is no layer `beauty_pass` (layers are rgba, color, line, line.outline, line.silhouette, \
-         line.material, line.crease, line.uv, line.feature, line.camera, line.reflection, line.refraction, line.hidden, below, Z, N, P, uv, object, feature, aov_ink)"
+         line.overlap, line.material, line.crease, line.uv, line.feature, line.camera, line.reflection, line.refraction, line.hidden, below, Z, N, P, uv, object, feature, aov_ink)"
     );
     assert_eq!(error("aov_inc", &["ink"]), "error: no shader of this scene writes `aov_inc` (did you mean `aov_ink`?)");
     let error: Diagnostic = "colour".parse::<Layer>().unwrap_err();
