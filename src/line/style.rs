@@ -9,7 +9,6 @@ use std::collections::BTreeMap;
 use smallvec::SmallVec;
 
 use super::differ::Fired;
-use super::differ::Fired;
 use super::pair::{Found, Pair, fired};
 use super::window::{PathTile, PathWindow, alpha};
 use super::{LineType, Rules, SeenLine, list};
@@ -158,14 +157,7 @@ impl Styler<'_, '_> {
     }
 
     /// Adds a line to what a script is asked about.
-    fn add(
-        &self,
-        batch: &mut PairBatch,
-        found: &Found,
-        pair: &Pair,
-        sides: [(&NodeColumns, usize); 2],
-        drawn: &Drawn,
-    ) {
+    fn add(&self, batch: &mut PairBatch, found: &Found, pair: &Pair, sides: [(&NodeColumns, usize); 2], drawn: &Drawn) {
         let [(nodes, row), _] = sides;
         // There is no pair without a reason.
         let kind = LineType::of(drawn.fired).unwrap_or(LineType::Feature);

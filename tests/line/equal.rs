@@ -5,9 +5,7 @@ use tusche::line::{LineBuffer, Method, Rules, SeenLine};
 use tusche::math::Vec3;
 use tusche::sample::{HandMadeSample, Node, NodePath, PixelRect, SampleBuffer, SampleColor};
 use tusche::scene::ids::ObjectId;
-use tusche::scene::settings::{
-    Composition, HiddenLines, LineOverrides, LineSettings, LineType, RayKinds, TypeStyle,
-};
+use tusche::scene::settings::{Composition, HiddenLines, LineOverrides, LineSettings, LineType, RayKinds, TypeStyle};
 
 use super::picture::{Tiles, layout};
 

@@ -15,12 +15,12 @@
 use super::bounds::Lists;
 use super::brute::other_side;
 use super::{Kind, List, Search, Surface, draws_at, draws_own, is_opaque, push_list};
-use crate::line::{LineCounts, Rules};
 use crate::line::bounds::{Bounded, Stylist};
 use crate::line::materials::may_differ;
 use crate::line::pair::{Found, LineNode, MOST_LINES, Pair, Rank, Taken, distance_squared};
 use crate::line::search::{pixel_gap_squared, pixel_rect, rect_gap_squared};
 use crate::line::window::{LineStyle, PathTile, style};
+use crate::line::{LineCounts, Rules};
 
 /// The line that each target sees which is not `skipped`, in no particular order.
 pub(in crate::line) fn find(search: &Search<'_, '_>, skipped: &[bool], counts: &mut LineCounts) -> Vec<Found> {
