@@ -122,7 +122,7 @@ impl SampleBufferBuilder {
         if node.object == 0 {
             return;
         }
-        let kept = NodeColumnSet { member: false, throughput: false, contribution: false, ..self.layout.columns };
+        let kept = NodeColumnSet { throughput: false, contribution: false, ..self.layout.columns };
         let (node, faults) = clean_node(node, kept, self.layout.max_width_of(node.shader));
         self.gate.note(path, sample, node.shader, faults);
         let place = self.behind.iter().position(|(rows, of)| *of == surface && rows.path == path);

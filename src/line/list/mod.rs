@@ -13,7 +13,8 @@
 //!
 //! Of all these the seen one minimises −priority, depth, distance, index of n, place in n's list, as in section 3.2.
 //!
-//! Whether two surfaces differ is decided by the tests of the material of the one that would draw.
+//! Whether two surfaces differ is decided by the tests of the material of the one that would draw. A line's type is that of
+//! the differences between the surface that draws it and the first of the other side.
 //!
 //! So lists add lines and take none away. The text can be read as if 3.2 held no more for K > 1; then two objects that
 //! cut each other would lose the line along the cut, since each goes on inside the other and is in both lists; and so would
