@@ -234,11 +234,9 @@ fn check_folds(scene: &Scene, unit: impl Fn(f32) -> f32) -> [usize; 2] {
         if is_lined {
             assert!(jump(4) > 2.0, "a line without a fold at {x}, {y}: the depths differ by {} px", jump(4));
         } else if depth.is_finite() && jump(1) >= 25.0 {
-            eprintln!("MISS {x} {y} {}", jump(1));
             missed += 1;
         }
     }
-    eprintln!("{missed} of {count}");
     [count, missed]
 }
 
@@ -247,15 +245,14 @@ fn the_folds_of_a_torus_are_found() {
     let torus = "[[objects]]\nshape = \"torus\"\nmaterial = \"ink\"\n";
     let fine = &format!("{torus}segments = 512\n");
     let camera = "projection = \"orthographic\"\nheight = 2.4\nposition = [0.0, 2.0, 5.0]";
-    // Samples on the outermost facet, which is seen from its edge, have no line; with its size they become rare.
     let [lined, missed] = check_folds(&scene(camera, torus), |_| 2.4 / 96.0);
-    assert!(lined > 50 && missed * 12 < lined, "{missed} missed, {lined} lined");
+    assert!(lined > 50 && missed == 0, "{missed} missed, {lined} lined");
     let [lined, missed] = check_folds(&scene(camera, fine), |_| 2.4 / 96.0);
-    assert!(lined > 50 && missed <= 1, "{missed} missed, {lined} lined");
+    assert!(lined > 50 && missed == 0, "{missed} missed, {lined} lined");
     let camera = "fov = 30.0\nposition = [0.0, 2.0, 4.0]";
     let spread = 2.0 * 15.0_f32.to_radians().tan() / 96.0;
     let [lined, missed] = check_folds(&scene(camera, fine), |depth| spread * depth);
-    assert!(lined > 50 && missed <= 1, "{missed} missed, {lined} lined");
+    assert!(lined > 50 && missed == 0, "{missed} missed, {lined} lined");
     // From above nothing is covered.
     let camera = "projection = \"orthographic\"\nheight = 2.4\nposition = [0.0, 5.0, 0.0]\nup = [0.0, 0.0, -1.0]";
     assert_eq!(check_folds(&scene(camera, torus), |_| 2.4 / 96.0)[0], 0);
@@ -271,7 +268,7 @@ fn the_folds_of_a_wavy_sheet_are_found_and_vanish_from_above() {
     };
     let camera = "projection = \"orthographic\"\nheight = 2.4\nposition = [9.0, 0.3, 5.0]";
     let [lined, missed] = check_folds(&with_waves(camera), |_| 2.4 / 96.0);
-    assert!(lined > 200 && missed * 30 < lined, "{missed} missed, {lined} lined");
+    assert!(lined > 200 && missed == 0, "{missed} missed, {lined} lined");
     let camera = "projection = \"orthographic\"\nheight = 2.4\nposition = [0.0, 0.3, 9.0]";
     assert_eq!(check_folds(&with_waves(camera), |_| 2.4 / 96.0)[0], 0);
 }
