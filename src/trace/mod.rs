@@ -1,7 +1,7 @@
 //! Rays: from a tile of pixels to its samples.
 //!
 //! - [`triangle`]: the watertight ray–triangle test.
-//! - [`tree`]: one bounding volume hierarchy over the triangles of a mesh, and the traversal all hierarchies share.
+//! - [`tree`]: bounding volume hierarchies and the traversal they share; [`mesh_tree`]: one over the triangles of a mesh.
 //! - [`world`]: one hierarchy over the objects; closest hits and shadow rays.
 //! - [`surface`]: from a hit to a place with normals, texture coordinates and error bounds.
 //! - [`wave`]: the rays of a tile, one depth of the ray tree at a time; `shadow` finds what lights give a hit, `scatter`
@@ -12,6 +12,8 @@
 
 mod cone;
 mod list;
+pub mod mesh_tree;
+pub mod packet;
 mod ray_tree;
 mod scatter;
 mod shadow;
@@ -20,9 +22,11 @@ pub mod tree;
 pub mod triangle;
 pub mod wave;
 pub mod world;
+mod world_packet;
 
 pub use wave::{RayCounts, TileTracer, TraceContext};
 pub use world::World;
+pub use world_packet::Way;
 
 /// Bound on the relative error of `n` roundings in a row (Higham; pbrt 4th edition, section 6.8.1).
 const fn gamma(n: u32) -> f32 {

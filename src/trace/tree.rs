@@ -1,10 +1,17 @@
-//! Bounding volume hierarchies: obvhs builds them, the traversal is ours.
+//! Bounding volume hierarchies: obvhs builds binary ones, whose nodes are merged into nodes of four; the traversal is ours.
 //!
 //! obvhs' own ray loop clamps directions at 1e-7 and does not round its box test outwards, so a ray may miss a box
 //! whose triangle it meets. Here the far distance is widened as Ize shows ("Robust BVH Ray Traversal", JCGT 2013), and
 //! boxes at the best distance, give or take roundings, are still visited, so that ties are settled by the lower triangle
 //! id and not by the order of the tree.
+//!
+//! **What a ray visits depends on the boxes of the leaves alone.** Subtraction, product, minimum and maximum round
+//! monotonically, so a box inside another is never entered before it or left behind it, and a ray that enters a leaf has
+//! entered all boxes around it. No hit counts as nearer than the near side of its leaf, so that one that is not visited any
+//! more could not have won. That is why packets, which go down the tree together and decide for each ray at the leaves,
+//! find the same bits as single rays.
 
+use std::ops::Range;
 use std::time::Duration;
 
 use obvhs::BvhBuildParams;
@@ -12,20 +19,119 @@ use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::builder::build_bvh2;
 use obvhs::bvh2::node::Bvh2Node;
+use smallvec::{SmallVec, smallvec};
 
-use super::triangle::{Ray, TriangleHit};
-use crate::math::{Vec3, Vec3A};
-use crate::scene::mesh::Mesh;
+use super::triangle::Ray;
+use crate::math::{Vec3, Vec4};
 
 /// 1 + 2 γ(3) in single precision, rounded up (Ize 2013, section 3).
-const BOX_FAR_SCALE: f32 = 1.000_000_4;
+pub(super) const BOX_FAR_SCALE: f32 = 1.000_000_4;
 /// The distance to a box and the one to a triangle on its face are rounded differently; this covers both.
-const BOX_NEAR_SCALE: f32 = 0.999_998;
+pub(super) const BOX_NEAR_SCALE: f32 = 0.999_998;
+/// Children of a node.
+const WIDTH: usize = 4;
+
+/// Four children and their boxes.
+#[derive(Clone, Copy)]
+#[repr(C, align(64))]
+struct Node {
+    /// Low x, y, z, then high x, y, z of all children. Boxes of absent children are inside out, so that no ray enters them.
+    planes: [Vec4; 6],
+    /// Where a child's places start, or which node it is.
+    first: [u32; WIDTH],
+    /// How many places a child has; 0 for nodes.
+    count: [u32; WIDTH],
+}
+
+impl Node {
+    const EMPTY: Self = Self {
+        planes: [
+            Vec4::INFINITY,
+            Vec4::INFINITY,
+            Vec4::INFINITY,
+            Vec4::NEG_INFINITY,
+            Vec4::NEG_INFINITY,
+            Vec4::NEG_INFINITY,
+        ],
+        first: [0; WIDTH],
+        count: [0; WIDTH],
+    };
+}
+
+/// A leaf that is visited.
+#[derive(Clone, Copy)]
+pub struct Leaf<'a> {
+    /// What is in it: places in [`BoxTree::order`], or what [`BoxTree::number_leaves`] made of them.
+    pub places: Places,
+    /// Distance at which its box is entered, rounded down.
+    pub near: f32,
+    node: &'a Node,
+    child: usize,
+}
+
+/// Where places start and how many there are.
+pub type Places = (u32, u32);
+
+impl Leaf<'_> {
+    /// Its places.
+    #[inline(always)]
+    #[must_use]
+    pub fn range(&self) -> Range<usize> {
+        self.places.0 as usize..(self.places.0 + self.places.1) as usize
+    }
+
+    /// Low x, y, z, then high x, y, z of its box.
+    #[inline(always)]
+    #[must_use]
+    pub(super) fn planes(&self) -> [f32; 6] {
+        self.node.planes.map(|plane| plane.to_array()[self.child])
+    }
+}
+
+/// What goes down a tree: a ray, or the bounds of several.
+pub trait Slabs {
+    /// Distances at which four boxes, given by their planes, are entered and left, as they are before they are scaled.
+    fn distances(&self, planes: &[Vec4; 6]) -> (Vec4, Vec4);
+}
+
+/// A ray as the box test sees it.
+struct RaySlabs {
+    origin: [Vec4; 3],
+    inverse: [Vec4; 3],
+    /// Which planes are entered and left, by axis.
+    near: [usize; 3],
+    far: [usize; 3],
+}
+
+impl RaySlabs {
+    #[inline(always)]
+    fn new(ray: &Ray) -> Self {
+        let negative = [0, 1, 2].map(|axis| ray.inverse[axis] < 0.0);
+        let [x, y, z] = negative.map(|negative| if negative { 3 } else { 0 });
+        Self {
+            origin: ray.origin.to_array().map(Vec4::splat),
+            inverse: ray.inverse.to_array().map(Vec4::splat),
+            near: [x, 1 + y, 2 + z],
+            far: [3 - x, 4 - y, 5 - z],
+        }
+    }
+}
+
+impl Slabs for RaySlabs {
+    #[inline(always)]
+    fn distances(&self, planes: &[Vec4; 6]) -> (Vec4, Vec4) {
+        let distance = |plane: usize, axis: usize| (planes[plane] - self.origin[axis]) * self.inverse[axis];
+        let [nx, ny, nz] = [0, 1, 2].map(|axis| distance(self.near[axis], axis));
+        let [fx, fy, fz] = [0, 1, 2].map(|axis| distance(self.far[axis], axis));
+        (nx.max(ny).max(nz), fx.min(fy).min(fz))
+    }
+}
 
 /// A hierarchy over any boxes. Its leaves are runs of [`BoxTree::order`].
 #[derive(Clone, Default)]
 pub struct BoxTree {
-    nodes: Vec<Bvh2Node>,
+    nodes: Vec<Node>,
+    bounds: Option<(Vec3, Vec3)>,
     /// The box of each place in the leaves, as an index into the boxes that the tree was built over.
     pub order: Vec<u32>,
 }
@@ -37,184 +143,199 @@ impl std::fmt::Debug for BoxTree {
 }
 
 impl BoxTree {
-    /// Builds a hierarchy. All boxes must be finite.
+    /// Builds a hierarchy with at most `most` boxes in a leaf. All boxes must be finite.
     #[must_use]
-    pub fn new(boxes: &[Aabb]) -> Self {
+    pub fn new(boxes: &[Aabb], most: u32) -> Self {
         if boxes.is_empty() {
             return Self::default();
         }
-        let Bvh2 { nodes, primitive_indices, .. } =
-            build_bvh2(boxes, BvhBuildParams::medium_build(), &mut Duration::default());
-        Self { nodes, order: primitive_indices }
+        let parameters = BvhBuildParams { max_prims_per_leaf: most, ..BvhBuildParams::medium_build() };
+        let Bvh2 { nodes: pairs, primitive_indices, .. } = build_bvh2(boxes, parameters, &mut Duration::default());
+        let bounds = pairs.first().map(|root| (root.aabb().min.into(), root.aabb().max.into()));
+        Self { nodes: merge(&pairs), bounds, order: primitive_indices }
     }
 
     /// The box around everything.
     #[must_use]
     pub fn bounds(&self) -> Option<(Vec3, Vec3)> {
-        self.nodes.first().map(|root| (root.aabb().min.into(), root.aabb().max.into()))
+        self.bounds
     }
 
-    /// Visits the leaf places whose boxes a ray may meet within `*t_max`, roughly front to back. `visit` gets a range
-    /// of places in [`Self::order`], may lower `t_max`, and returns whether to go on.
-    #[inline]
-    pub fn traverse(
-        &self,
-        ray: &Ray,
-        t_max: &mut f32,
-        mut visit: impl FnMut(std::ops::Range<usize>, &mut f32) -> bool,
-    ) {
-        let origin = Vec3A::from(ray.origin);
-        let inverse = Vec3A::from(ray.inverse);
-        let enter = |node: &Bvh2Node| {
-            let bounds = node.aabb();
-            let t1 = (bounds.min - origin) * inverse;
-            let t2 = (bounds.max - origin) * inverse;
-            let near = t1.min(t2).max_element().max(0.0) * BOX_NEAR_SCALE;
-            let far = t1.max(t2).min_element() * BOX_FAR_SCALE;
-            if near <= far { near } else { f32::INFINITY }
-        };
-        let leaf = |node: &Bvh2Node| {
-            let first = node.first_index as usize;
-            first..first + node.prim_count as usize
-        };
+    /// Memory that the tree takes.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        size_of_val(&self.nodes[..]) + size_of_val(&self.order[..])
+    }
 
-        let Some(root) = self.nodes.first() else { return };
-        let root_near = enter(root);
-        if root_near == f32::INFINITY || root_near > *t_max {
-            return;
+    /// Replaces the places of each leaf.
+    pub fn number_leaves(&mut self, mut places: impl FnMut(Range<usize>) -> Places) {
+        for node in &mut self.nodes {
+            for child in 0..WIDTH {
+                if node.count[child] > 0 {
+                    let first = node.first[child] as usize;
+                    (node.first[child], node.count[child]) = places(first..first + node.count[child] as usize);
+                }
+            }
         }
-        if root.is_leaf() {
-            visit(leaf(root), t_max);
+    }
+
+    /// Visits the leaves that a ray enters within `*t_max`, roughly front to back. `visit` may lower `t_max` and returns
+    /// whether to go on.
+    #[inline]
+    pub fn traverse(&self, ray: &Ray, t_max: &mut f32, visit: impl FnMut(Leaf<'_>, &mut f32) -> bool) {
+        if ray.is_sound() {
+            self.walk(&RaySlabs::new(ray), t_max, visit);
+        }
+    }
+
+    /// The same for anything that has slab distances, none of which may be NaN.
+    #[inline(always)]
+    pub fn walk(&self, slabs: &impl Slabs, t_max: &mut f32, mut visit: impl FnMut(Leaf<'_>, &mut f32) -> bool) {
+        if self.nodes.is_empty() {
             return;
         }
         let mut stack = Stack::new();
-        let mut pair = root.first_index as usize;
+        let mut at = 0;
         loop {
-            let (mut left, mut right) = (&self.nodes[pair], &self.nodes[pair + 1]);
-            let (mut left_near, mut right_near) = (enter(left), enter(right));
-            if right_near < left_near {
-                std::mem::swap(&mut left, &mut right);
-                std::mem::swap(&mut left_near, &mut right_near);
-            }
+            let node = &self.nodes[at];
+            let (near, far) = slabs.distances(&node.planes);
+            let near = near.max(Vec4::ZERO) * BOX_NEAR_SCALE;
+            let far = far * BOX_FAR_SCALE;
+            let entered = near.cmple(far.min(Vec4::splat(*t_max))).bitmask();
+            // A key is a distance and a child; distances are not negative, so keys are in their order.
+            let nears = near.to_array();
+            let key = |child: u32| {
+                let child = child & (WIDTH as u32 - 1);
+                u64::from(nears[child as usize].to_bits()) << 32 | u64::from(at as u32 * WIDTH as u32 + child)
+            };
+            let mut left = entered;
             let mut next = None;
-            if left_near != f32::INFINITY && left_near <= *t_max {
-                if left.is_leaf() {
-                    if !visit(leaf(left), t_max) {
-                        return;
+            if left != 0 {
+                let mut nearest = key(left.trailing_zeros());
+                left &= left - 1;
+                if left != 0 {
+                    let mut second = key(left.trailing_zeros());
+                    left &= left - 1;
+                    if second < nearest {
+                        std::mem::swap(&mut nearest, &mut second);
                     }
-                } else {
-                    next = Some(left.first_index as usize);
+                    if left != 0 {
+                        let mut third = key(left.trailing_zeros());
+                        left &= left - 1;
+                        if left != 0 {
+                            let mut fourth = key(left.trailing_zeros());
+                            if fourth < third {
+                                std::mem::swap(&mut third, &mut fourth);
+                            }
+                            if third < nearest {
+                                std::mem::swap(&mut nearest, &mut third);
+                            }
+                            if fourth < second {
+                                std::mem::swap(&mut second, &mut fourth);
+                            }
+                            stack.push(fourth);
+                        } else if third < nearest {
+                            std::mem::swap(&mut nearest, &mut third);
+                        }
+                        stack.push(second.max(third));
+                        stack.push(second.min(third));
+                    } else {
+                        stack.push(second);
+                    }
                 }
+                next = Some(nearest);
             }
-            if right_near != f32::INFINITY && right_near <= *t_max {
-                if right.is_leaf() {
-                    if !visit(leaf(right), t_max) {
-                        return;
-                    }
-                } else if next.is_some() {
-                    stack.push(right.first_index, right_near);
-                } else {
-                    next = Some(right.first_index as usize);
+            at = loop {
+                let Some(key) = next.take().or_else(|| stack.pop()) else { return };
+                let near = f32::from_bits((key >> 32) as u32);
+                if near > *t_max {
+                    continue;
                 }
-            }
-            pair = match next {
-                Some(pair) => pair,
-                None => loop {
-                    match stack.pop() {
-                        None => return,
-                        Some((pair, near)) if near <= *t_max => break pair as usize,
-                        Some(_) => {}
-                    }
-                },
+                let (parent, child) = (key as u32 as usize / WIDTH, key as usize % WIDTH);
+                let node = &self.nodes[parent];
+                let places = (node.first[child], node.count[child]);
+                if places.1 == 0 {
+                    break places.0 as usize;
+                }
+                if !visit(Leaf { places, near, node, child }, t_max) {
+                    return;
+                }
             };
         }
     }
 }
 
-/// Postponed nodes: on the stack for the depths that rays go to, on the heap beyond. Clearing it is part of the cost of
+/// Merges a binary hierarchy into nodes of four: of the children of a node the largest is replaced by its own two until
+/// there are four. The children of a node stand next to each other.
+fn merge(pairs: &[Bvh2Node]) -> Vec<Node> {
+    let mut nodes = vec![Node::EMPTY];
+    // Nodes to fill, with what of the binary tree they stand for.
+    let mut open = vec![(0_usize, 0_u32)];
+    while let Some((node, pair)) = open.pop() {
+        let mut children: SmallVec<[u32; WIDTH]> = smallvec![pair];
+        while children.len() < WIDTH {
+            let area = |place: usize| pairs[children[place] as usize].aabb().half_area();
+            let largest = (0..children.len())
+                .filter(|&place| !pairs[children[place] as usize].is_leaf())
+                .max_by(|&a, &b| area(a).total_cmp(&area(b)));
+            let Some(largest) = largest else { break };
+            let first = pairs[children[largest] as usize].first_index;
+            children[largest] = first;
+            children.push(first + 1);
+        }
+        for (child, &pair) in children.iter().enumerate() {
+            let from = &pairs[pair as usize];
+            let bounds = from.aabb();
+            for axis in 0..3 {
+                nodes[node].planes[axis][child] = bounds.min[axis];
+                nodes[node].planes[axis + 3][child] = bounds.max[axis];
+            }
+            if from.is_leaf() {
+                nodes[node].first[child] = from.first_index;
+                nodes[node].count[child] = from.prim_count;
+            } else {
+                nodes[node].first[child] = nodes.len() as u32;
+                open.push((nodes.len(), pair));
+                nodes.push(Node::EMPTY);
+            }
+        }
+    }
+    nodes
+}
+
+/// Postponed children: on the stack for the depths that rays go to, on the heap beyond. Clearing it is part of the cost of
 /// every ray, so it is no larger than needed.
 struct Stack {
-    inline: [(u32, f32); Self::INLINE],
+    inline: [u64; Self::INLINE],
     length: usize,
-    beyond: Vec<(u32, f32)>,
+    beyond: Vec<u64>,
 }
 
 impl Stack {
-    const INLINE: usize = 32;
+    const INLINE: usize = 40;
 
+    #[inline(always)]
     fn new() -> Self {
-        Self { inline: [(0, 0.0); Self::INLINE], length: 0, beyond: Vec::new() }
+        Self { inline: [0; Self::INLINE], length: 0, beyond: Vec::new() }
     }
 
-    #[inline]
-    fn push(&mut self, pair: u32, near: f32) {
+    #[inline(always)]
+    fn push(&mut self, key: u64) {
         match self.inline.get_mut(self.length) {
             Some(place) => {
-                *place = (pair, near);
+                *place = key;
                 self.length += 1;
             }
-            None => self.beyond.push((pair, near)),
+            None => self.beyond.push(key),
         }
     }
 
-    #[inline]
-    fn pop(&mut self) -> Option<(u32, f32)> {
-        if let Some(entry) = self.beyond.pop() {
-            return Some(entry);
+    #[inline(always)]
+    fn pop(&mut self) -> Option<u64> {
+        if let Some(key) = self.beyond.pop() {
+            return Some(key);
         }
         self.length = self.length.checked_sub(1)?;
         Some(self.inline[self.length])
-    }
-}
-
-/// A mesh's triangles under a hierarchy, in the mesh's own space.
-#[derive(Clone, Debug)]
-pub struct MeshTree {
-    tree: BoxTree,
-    /// Vertex positions of the triangles, in leaf order, so that a leaf reads one run of memory.
-    triangles: Vec<[Vec3; 3]>,
-}
-
-impl MeshTree {
-    /// Builds the hierarchy of a mesh. Triangles with a coordinate that is not finite are left out.
-    #[must_use]
-    pub fn new(mesh: &Mesh) -> Self {
-        let corners = |triangle: &[u32; 3]| triangle.map(|vertex| mesh.positions[vertex as usize]);
-        let (ids, boxes): (Vec<u32>, Vec<Aabb>) = mesh
-            .triangles
-            .iter()
-            .enumerate()
-            .map(|(id, triangle)| (id as u32, corners(triangle)))
-            .filter(|(_, corners)| corners.iter().all(|corner| corner.is_finite()))
-            .map(|(id, corners)| (id, Aabb::from_points(&corners.map(Vec3A::from))))
-            .unzip();
-        let mut tree = BoxTree::new(&boxes);
-        for place in &mut tree.order {
-            *place = ids[*place as usize];
-        }
-        let triangles = tree.order.iter().map(|id| corners(&mesh.triangles[*id as usize])).collect();
-        Self { tree, triangles }
-    }
-
-    /// The box around the mesh; `None` if it has no triangles.
-    #[must_use]
-    pub fn bounds(&self) -> Option<(Vec3, Vec3)> {
-        self.tree.bounds()
-    }
-
-    /// Shows each triangle that the ray meets within `*t_max` to `accept`, with its id, roughly front to back.
-    /// `accept` may lower `t_max` and returns whether to go on.
-    #[inline]
-    pub fn intersect(&self, ray: &Ray, t_max: &mut f32, mut accept: impl FnMut(u32, TriangleHit, &mut f32) -> bool) {
-        self.tree.traverse(ray, t_max, |places, t_max| {
-            for place in places {
-                if let Some(hit) = ray.triangle(&self.triangles[place], *t_max)
-                    && !accept(self.tree.order[place], hit, t_max)
-                {
-                    return false;
-                }
-            }
-            true
-        });
     }
 }

@@ -8,6 +8,9 @@
 use super::gamma;
 use crate::math::Vec3;
 
+/// A vertex that is not farther ahead of a ray than this, times the farthest of its triangle, may be behind it.
+pub(super) const NOT_AHEAD: f32 = gamma(8);
+
 /// A ray, with what the triangle test needs of it worked out.
 #[derive(Clone, Copy, Debug)]
 pub struct Ray {
@@ -17,8 +20,9 @@ pub struct Ray {
     pub direction: Vec3,
     /// 1 / direction, with zeros replaced by values too small to matter (see [`Ray::new`]).
     pub(super) inverse: Vec3,
-    axes: [usize; 3],
-    shear: Vec3,
+    /// Axes of the sheared space, the ray's own last.
+    pub(super) axes: [usize; 3],
+    pub(super) shear: Vec3,
 }
 
 /// Where a ray meets a triangle.
@@ -58,6 +62,13 @@ impl Ray {
         let safe = |d: f32| 1.0 / if d.abs() < 1e-30 { 1e-30_f32.copysign(d) } else { d };
         let inverse = Vec3::new(safe(direction.x), safe(direction.y), safe(direction.z));
         Self { origin, direction, inverse, axes: [x, y, z], shear }
+    }
+
+    /// Whether it can meet anything.
+    #[inline]
+    #[must_use]
+    pub(super) fn is_sound(&self) -> bool {
+        self.origin.is_finite() && self.direction.is_finite()
     }
 
     /// The point at a distance.
@@ -102,7 +113,7 @@ impl Ray {
             // alone: the ray may leave this very triangle, a hair off it.
             let largest = |a: f32, b: f32, c: f32| a.abs().max(b.abs()).max(c.abs());
             let z = largest(az, bz, cz);
-            if az.min(bz).min(cz) <= gamma(8) * z {
+            if az.min(bz).min(cz) <= NOT_AHEAD * z {
                 let edges = [largest(ax, bx, cx), largest(ay, by, cy), largest(u, v, w)];
                 if t <= distance_error(edges, z) / determinant.abs() {
                     return None;

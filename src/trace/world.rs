@@ -5,7 +5,8 @@ use std::sync::Arc;
 use obvhs::aabb::Aabb;
 use rayon::prelude::*;
 
-use super::tree::{BoxTree, MeshTree};
+use super::mesh_tree::MeshTree;
+use super::tree::BoxTree;
 use super::triangle::Ray;
 use crate::math::{DVec3, Mat3, Vec3, Vec3A};
 use crate::scene::Scene;
@@ -51,13 +52,13 @@ pub struct PlacedObject {
     pub world_from_object: Mat3,
     /// Where the object's origin lies, relative to the camera.
     pub translation: Vec3,
-    object_from_world: Mat3,
+    pub(super) object_from_world: Mat3,
     /// Inverse transpose of the linear part, for normals.
     pub normal_from_object: Mat3,
-    visible_to: RayKinds,
-    tree: Arc<MeshTree>,
+    pub(super) visible_to: RayKinds,
+    pub(super) tree: Arc<MeshTree>,
     /// By slot: whether the back side is invisible to camera, reflection and refraction rays.
-    single_sided: Vec<bool>,
+    pub(super) single_sided: Vec<bool>,
 }
 
 impl PlacedObject {
@@ -76,9 +77,11 @@ impl PlacedObject {
 /// The scene as rays see it. Everything is relative to the camera's position.
 #[derive(Clone, Debug)]
 pub struct World {
-    tree: BoxTree,
+    pub(super) tree: BoxTree,
     /// By object id. Objects that no ray can meet (no triangles, singular transform) are not in the tree.
-    objects: Vec<PlacedObject>,
+    pub(super) objects: Vec<PlacedObject>,
+    /// The instructions that packets use.
+    pub(super) arch: pulp::Arch,
     /// The camera's position in the world.
     pub origin: DVec3,
 }
@@ -121,11 +124,20 @@ impl World {
             .filter(|(_, object)| object.object_from_world.is_finite() && object.world_from_object.is_finite())
             .filter_map(|(id, object)| Some((id as u32, world_box(object)?)))
             .unzip();
-        let mut tree = BoxTree::new(&boxes);
+        let mut tree = BoxTree::new(&boxes, 2);
         for place in &mut tree.order {
             *place = ids[*place as usize];
         }
-        Self { tree, objects, origin }
+        Self { tree, objects, arch: pulp::Arch::new(), origin }
+    }
+
+    /// Memory that the hierarchies take, with their copies of the triangles; meshes used more than once count once.
+    #[must_use]
+    pub fn tree_bytes(&self) -> usize {
+        let mut trees: Vec<&Arc<MeshTree>> = self.objects.iter().map(|object| &object.tree).collect();
+        trees.sort_by_key(|tree| Arc::as_ptr(tree));
+        trees.dedup_by(|a, b| Arc::ptr_eq(a, b));
+        self.tree.bytes() + trees.iter().map(|tree| tree.bytes()).sum::<usize>()
     }
 
     /// An object by id.
@@ -231,8 +243,8 @@ impl World {
     fn each_hit(&self, ray: &Ray, kind: RayKinds, t_max: f32, mut accept: impl FnMut(Hit, &mut f32) -> bool) {
         let culls = kind != RayKinds::SHADOW;
         let mut t_max = t_max;
-        self.tree.traverse(ray, &mut t_max, |places, t_max| {
-            for id in &self.tree.order[places] {
+        self.tree.traverse(ray, &mut t_max, |leaf, t_max| {
+            for id in &self.tree.order[leaf.range()] {
                 let object = &self.objects[*id as usize];
                 if !object.visible_to.contains(kind) {
                     continue;
@@ -243,7 +255,7 @@ impl World {
                         return true;
                     }
                     let hit = Hit {
-                        t: hit.t,
+                        t: hit.t.max(leaf.near),
                         object: ObjectId(*id),
                         triangle,
                         barycentric: [hit.u, hit.v],

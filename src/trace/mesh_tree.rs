@@ -1,0 +1,174 @@
+//! The triangles of a mesh under a hierarchy, four side by side, in the mesh's own space.
+
+use obvhs::aabb::Aabb;
+
+use super::tree::{BoxTree, Leaf};
+use super::triangle::{NOT_AHEAD, Ray, TriangleHit};
+use crate::math::{Vec3, Vec3A, Vec4};
+use crate::scene::mesh::Mesh;
+
+/// Triangles of a block.
+pub(super) const WIDTH: usize = 4;
+/// The id of an absent triangle.
+const NONE: u32 = u32::MAX;
+
+/// Four triangles. Absent ones have vertices that are NaN, so that no ray meets them.
+#[derive(Clone, Copy)]
+#[repr(C, align(32))]
+pub(super) struct Block {
+    /// By vertex and axis.
+    corners: [[Vec4; 3]; 3],
+    ids: [u32; WIDTH],
+}
+
+impl Block {
+    /// One triangle's id and vertices; `None` beyond the last.
+    #[inline(always)]
+    pub fn triangle(&self, place: usize) -> Option<(u32, [Vec3; 3])> {
+        let id = self.ids[place];
+        let corner = |vertex: &[Vec4; 3]| Vec3::from_array(vertex.map(|axis| axis.to_array()[place]));
+        (id != NONE).then(|| (id, self.corners.each_ref().map(corner)))
+    }
+
+    /// Shows each triangle that the ray meets within `*t_max` to `accept`. The tests are those of [`Ray::triangle`],
+    /// operation by operation, on four triangles at a time; where it does more than that, it is asked itself.
+    #[inline(always)]
+    fn intersect(
+        &self,
+        ray: &Ray,
+        near: f32,
+        t_max: &mut f32,
+        accept: &mut impl FnMut(u32, TriangleHit, &mut f32) -> bool,
+    ) -> bool {
+        let [kx, ky, kz] = ray.axes.map(|axis| axis.min(2));
+        let origin = ray.origin.to_array();
+        let [x0, y0, z0] = [kx, ky, kz].map(|axis| Vec4::splat(origin[axis]));
+        let [sx, sy, sz] = ray.shear.to_array().map(Vec4::splat);
+        let [[ax, ay, az], [bx, by, bz], [cx, cy, cz]] = self.corners.each_ref().map(|corner| {
+            let z = corner[kz] - z0;
+            [corner[kx] - x0 - sx * z, corner[ky] - y0 - sy * z, z]
+        });
+        let u = cx * by - cy * bx;
+        let v = ax * cy - ay * cx;
+        let w = bx * ay - by * ax;
+        let zero = Vec4::ZERO;
+        let outside = u.min(v).min(w).cmplt(zero) & u.max(v).max(w).cmpgt(zero);
+        let edge = u.cmpeq(zero) | v.cmpeq(zero) | w.cmpeq(zero);
+        if (!outside | edge).bitmask() == 0 {
+            return true;
+        }
+        let determinant = u + v + w;
+        let [az, bz, cz] = [sz * az, sz * bz, sz * cz];
+        let t = (u * az + v * bz + w * cz) / determinant;
+        let mut candidates = ((!outside & t.cmpgt(zero) & t.cmple(Vec4::splat(*t_max))) | edge).bitmask();
+        if candidates == 0 {
+            return true;
+        }
+        let largest = az.abs().max(bz.abs()).max(cz.abs());
+        let special = (edge | az.min(bz).min(cz).cmple(largest * NOT_AHEAD)).bitmask();
+        let [t, v, w, determinant] = [t, v, w, determinant].map(|four| four.to_array());
+        while candidates != 0 {
+            let place = candidates.trailing_zeros() as usize % WIDTH;
+            candidates &= candidates - 1;
+            let hit = if special & (1 << place) == 0 {
+                let determinant = determinant[place];
+                let [u, v] = [v[place] / determinant, w[place] / determinant];
+                Some(TriangleHit { t: t[place], u, v, front: determinant > 0.0 })
+            } else {
+                self.triangle(place).and_then(|(_, vertices)| ray.triangle(&vertices, *t_max))
+            };
+            if let Some(mut hit) = hit {
+                // See the head of `tree`.
+                hit.t = hit.t.max(near);
+                if hit.t <= *t_max && !accept(self.ids[place], hit, t_max) {
+                    return false;
+                }
+            }
+        }
+        true
+    }
+}
+
+/// A mesh's triangles under a hierarchy, in the mesh's own space.
+#[derive(Clone)]
+pub struct MeshTree {
+    tree: BoxTree,
+    blocks: Vec<Block>,
+}
+
+impl std::fmt::Debug for MeshTree {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "MeshTree({:?}, {} blocks)", self.tree, self.blocks.len())
+    }
+}
+
+impl MeshTree {
+    /// Builds the hierarchy of a mesh. Triangles with a coordinate that is not finite are left out.
+    #[must_use]
+    pub fn new(mesh: &Mesh) -> Self {
+        let corners = |triangle: &[u32; 3]| triangle.map(|vertex| mesh.positions[vertex as usize]);
+        let (ids, boxes): (Vec<u32>, Vec<Aabb>) = mesh
+            .triangles
+            .iter()
+            .enumerate()
+            .map(|(id, triangle)| (id as u32, corners(triangle)))
+            .filter(|(_, corners)| corners.iter().all(|corner| corner.is_finite()))
+            .map(|(id, corners)| (id, Aabb::from_points(&corners.map(Vec3A::from))))
+            .unzip();
+        let mut tree = BoxTree::new(&boxes, WIDTH as u32);
+        let mut blocks = Vec::with_capacity(boxes.len() / 2);
+        let order = std::mem::take(&mut tree.order);
+        tree.number_leaves(|places| {
+            let first = blocks.len() as u32;
+            for places in order[places].chunks(WIDTH) {
+                let mut block = Block { corners: [[Vec4::NAN; 3]; 3], ids: [NONE; WIDTH] };
+                for (lane, place) in places.iter().enumerate() {
+                    let id = ids[*place as usize];
+                    block.ids[lane] = id;
+                    for (into, corner) in block.corners.iter_mut().zip(corners(&mesh.triangles[id as usize])) {
+                        for (axis, into) in into.iter_mut().enumerate() {
+                            into[lane] = corner[axis];
+                        }
+                    }
+                }
+                blocks.push(block);
+            }
+            (first, blocks.len() as u32 - first)
+        });
+        blocks.shrink_to_fit();
+        Self { tree, blocks }
+    }
+
+    /// The box around the mesh; `None` if it has no triangles.
+    #[must_use]
+    pub fn bounds(&self) -> Option<(Vec3, Vec3)> {
+        self.tree.bounds()
+    }
+
+    /// Memory that the hierarchy and its copy of the triangles take.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        self.tree.bytes() + size_of_val(&self.blocks[..])
+    }
+
+    /// The hierarchy; its leaves hold places among the blocks.
+    #[inline(always)]
+    pub(super) fn tree(&self) -> &BoxTree {
+        &self.tree
+    }
+
+    /// What a leaf holds.
+    #[inline(always)]
+    pub(super) fn blocks(&self, leaf: &Leaf<'_>) -> &[Block] {
+        &self.blocks[leaf.range()]
+    }
+
+    /// Shows each triangle that the ray meets within `*t_max` to `accept`, with its id, roughly front to back.
+    /// `accept` may lower `t_max` and returns whether to go on.
+    #[inline]
+    pub fn intersect(&self, ray: &Ray, t_max: &mut f32, mut accept: impl FnMut(u32, TriangleHit, &mut f32) -> bool) {
+        self.tree.traverse(ray, t_max, |leaf, t_max| {
+            self.blocks(&leaf).iter().all(|block| block.intersect(ray, leaf.near, t_max, &mut accept))
+        });
+    }
+}

@@ -1,0 +1,380 @@
+//! Packets: rays that go much the same way, sixteen at a time.
+//!
+//! A packet goes down a hierarchy as one: its [`Bundle`] bounds the slab distances of all its rays, and four boxes are tested
+//! with it at once. Only at the leaves is each ray asked whether it enters, and then meets each triangle, with the
+//! operations of the single ray in their order, in loops over lanes that the compiler vectorises for the instructions that
+//! [`pulp::Arch`] finds at run time. See the head of `tree` for why it finds the same bits.
+//!
+//! Rays whose largest components differ in axis or sign would need triangles sheared in different ways; they are no packet
+//! ([`LaneRays::shear`]) and are traced one at a time.
+
+use super::mesh_tree::{MeshTree, WIDTH};
+use super::tree::{BOX_FAR_SCALE, BOX_NEAR_SCALE, Leaf, Slabs};
+use super::triangle::{NOT_AHEAD, Ray};
+use crate::math::{Mat3, Vec3, Vec4};
+
+/// Rays of a packet.
+pub const LANES: usize = 16;
+
+/// Origin and direction of a ray.
+pub type RayStart = (Vec3, Vec3);
+
+/// One number of each ray.
+pub(super) type Lanes = [f32; LANES];
+
+/// The reach of a lane that takes part no more.
+pub(super) const DONE: f32 = -1.0;
+
+#[inline(always)]
+fn min(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
+}
+
+#[inline(always)]
+fn max(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
+}
+
+/// The largest of all lanes.
+#[inline(always)]
+pub(super) fn largest(lanes: &Lanes) -> f32 {
+    lanes.iter().fold(f32::NEG_INFINITY, |largest, &lane| max(largest, lane))
+}
+
+/// The rays of a packet in one space.
+#[derive(Clone, Copy)]
+pub(super) struct LaneRays {
+    pub origin: [Lanes; 3],
+    pub direction: [Lanes; 3],
+    inverse: [Lanes; 3],
+}
+
+impl LaneRays {
+    /// Some rays, the last of them repeated; none of no rays.
+    #[inline(always)]
+    pub fn of(rays: &[RayStart]) -> Option<Self> {
+        let last = rays.last()?;
+        let (mut origin, mut direction) = ([[0.0; LANES]; 3], [[0.0; LANES]; 3]);
+        for i in 0..LANES {
+            let (from, towards) = rays.get(i).unwrap_or(last);
+            for axis in 0..3 {
+                origin[axis][i] = from[axis];
+                direction[axis][i] = towards[axis];
+            }
+        }
+        Some(Self::new(origin, direction))
+    }
+
+    #[inline(always)]
+    fn new(origin: [Lanes; 3], direction: [Lanes; 3]) -> Self {
+        let mut inverse = [[0.0; LANES]; 3];
+        for (inverse, direction) in inverse.iter_mut().zip(&direction) {
+            for i in 0..LANES {
+                // As in `Ray::new`.
+                let d = direction[i];
+                inverse[i] = 1.0 / if d.abs() < 1e-30 { 1e-30_f32.copysign(d) } else { d };
+            }
+        }
+        Self { origin, direction, inverse }
+    }
+
+    /// The rays in the space of an object, as [`super::world::PlacedObject`] places single rays there.
+    #[inline(always)]
+    pub fn placed(&self, object_from_world: &Mat3, translation: Vec3) -> Self {
+        let m = object_from_world.to_cols_array_2d();
+        let mut origin = [[0.0; LANES]; 3];
+        let mut direction = [[0.0; LANES]; 3];
+        for axis in 0..3 {
+            for i in 0..LANES {
+                let [x, y, z] = [0, 1, 2].map(|k: usize| self.origin[k][i] - translation[k]);
+                origin[axis][i] = m[0][axis] * x + m[1][axis] * y + m[2][axis] * z;
+                let [x, y, z] = self.direction.map(|lanes| lanes[i]);
+                direction[axis][i] = m[0][axis] * x + m[1][axis] * y + m[2][axis] * z;
+            }
+        }
+        Self::new(origin, direction)
+    }
+
+    /// One of the rays.
+    #[inline]
+    pub fn ray(&self, lane: usize) -> Ray {
+        let vector = |lanes: &[Lanes; 3]| Vec3::from_array(lanes.each_ref().map(|axis| axis[lane]));
+        Ray::new(vector(&self.origin), vector(&self.direction))
+    }
+
+    /// What the triangle test needs; `None` if the rays are no packet.
+    #[inline(always)]
+    pub fn shear(&self) -> Option<Shear> {
+        // The axis and its order are those of `Ray::new`.
+        let [dx, dy, dz] = &self.direction;
+        let (mut by_x, mut by_y, mut sound) = (0_u32, 0_u32, 0_u32);
+        for i in 0..LANES {
+            let [x, y, z] = [dx[i].abs(), dy[i].abs(), dz[i].abs()];
+            let is_x = (x > y) & (x > z);
+            by_x += u32::from(is_x);
+            by_y += u32::from(!is_x & (y > z));
+        }
+        for lanes in self.origin.iter().chain(&self.direction) {
+            for lane in lanes {
+                sound += u32::from(lane.abs() < f32::INFINITY);
+            }
+        }
+        let all = LANES as u32;
+        let z = match (by_x, by_y) {
+            (x, _) if x == all => 0,
+            (_, y) if y == all => 1,
+            (0, 0) => 2,
+            _ => return None,
+        };
+        let negative = self.direction[z].iter().map(|d| u32::from(*d < 0.0)).sum::<u32>();
+        if sound != 6 * all || (negative != 0 && negative != all) {
+            return None;
+        }
+        let (mut x, mut y) = ((z + 1) % 3, (z + 2) % 3);
+        if negative != 0 {
+            std::mem::swap(&mut x, &mut y);
+        }
+        let mut shear = Shear { axes: [x, y, z], x: [0.0; LANES], y: [0.0; LANES], z: [0.0; LANES] };
+        let [along_x, along_y, along_z] = [x, y, z].map(|axis| &self.direction[axis]);
+        for i in 0..LANES {
+            shear.x[i] = along_x[i] / along_z[i];
+            shear.y[i] = along_y[i] / along_z[i];
+            shear.z[i] = 1.0 / along_z[i];
+        }
+        Some(shear)
+    }
+
+    /// Bounds on the distances of the slab test.
+    #[inline(always)]
+    pub fn bundle(&self) -> Bundle {
+        let bounds = |lanes: &Lanes| lanes.iter().fold((lanes[0], lanes[0]), |(a, b), &x| (min(a, x), max(b, x)));
+        let mut bundle =
+            Bundle { near: [0, 1, 2], far: [3, 4, 5], origin: [[Vec4::ZERO; 2]; 3], inverse: [[Vec4::ZERO; 2]; 3], mixed: [false; 3] };
+        for axis in 0..3 {
+            let (low, high) = bounds(&self.origin[axis]);
+            let (least, most) = bounds(&self.inverse[axis]);
+            bundle.mixed[axis] = least < 0.0 && most > 0.0;
+            bundle.inverse[axis] = [least, most].map(Vec4::splat);
+            bundle.origin[axis] = [high, low].map(Vec4::splat);
+            if most < 0.0 {
+                std::mem::swap(&mut bundle.near[axis], &mut bundle.far[axis]);
+                bundle.origin[axis].swap(0, 1);
+            }
+        }
+        bundle
+    }
+
+    /// Where each ray enters a leaf, and how far it reaches there: as in `reach`, or [`DONE`] where it does not enter. Whether
+    /// any does.
+    #[inline(always)]
+    pub fn enter(&self, leaf: &Leaf<'_>, reach: &Lanes) -> (Lanes, Lanes, bool) {
+        let [x0, y0, z0, x1, y1, z1] = leaf.planes();
+        let ([ox, oy, oz], [ix, iy, iz]) = (&self.origin, &self.inverse);
+        let (mut near, mut limit) = ([0.0; LANES], [0.0; LANES]);
+        let mut any = 0;
+        for i in 0..LANES {
+            let (x0, x1) = ((x0 - ox[i]) * ix[i], (x1 - ox[i]) * ix[i]);
+            let (y0, y1) = ((y0 - oy[i]) * iy[i], (y1 - oy[i]) * iy[i]);
+            let (z0, z1) = ((z0 - oz[i]) * iz[i], (z1 - oz[i]) * iz[i]);
+            let enter = max(max(min(x0, x1), min(y0, y1)), max(min(z0, z1), 0.0)) * BOX_NEAR_SCALE;
+            let leave = min(min(max(x0, x1), max(y0, y1)), max(z0, z1)) * BOX_FAR_SCALE;
+            let enters = (enter <= leave) & (enter <= reach[i]);
+            near[i] = enter;
+            limit[i] = if enters { reach[i] } else { DONE };
+            any |= u32::from(enters);
+        }
+        (near, limit, any != 0)
+    }
+}
+
+/// Bounds on what the slab test of any ray of a packet gives: all operations round monotonically, so the bounds hold to the
+/// last bit.
+pub(super) struct Bundle {
+    near: [usize; 3],
+    far: [usize; 3],
+    /// By axis: the origin from which the near plane is least far ahead, and the one from which the far plane is
+    /// farthest.
+    origin: [[Vec4; 2]; 3],
+    /// Least and largest.
+    inverse: [[Vec4; 2]; 3],
+    /// Axes along which the rays go both ways: they bound nothing. The largest components of the rays of a packet have one
+    /// axis and one sign, so there is always an axis that does.
+    mixed: [bool; 3],
+}
+
+impl Slabs for Bundle {
+    #[inline(always)]
+    fn distances(&self, planes: &[Vec4; 6]) -> (Vec4, Vec4) {
+        let (mut near, mut far) = (Vec4::NEG_INFINITY, Vec4::INFINITY);
+        for axis in 0..3 {
+            if self.mixed[axis] {
+                continue;
+            }
+            let [least, most] = self.inverse[axis];
+            let ahead = planes[self.near[axis]] - self.origin[axis][0];
+            near = near.max((ahead * least).min(ahead * most));
+            let ahead = planes[self.far[axis]] - self.origin[axis][1];
+            far = far.min((ahead * least).max(ahead * most));
+        }
+        (near, far)
+    }
+}
+
+/// A packet's rays as the triangle test sees them.
+pub(super) struct Shear {
+    axes: [usize; 3],
+    x: Lanes,
+    y: Lanes,
+    z: Lanes,
+}
+
+/// Hits of a packet's rays with one triangle.
+pub(super) struct LaneHits {
+    pub t: Lanes,
+    pub u: Lanes,
+    pub v: Lanes,
+    /// 1: front, 2: back, 0: no hit.
+    pub side: [u32; LANES],
+}
+
+impl LaneHits {
+    pub const NONE: u32 = 0;
+    pub const FRONT: u32 = 1;
+    pub const BACK: u32 = 2;
+    /// Asks for [`Ray::triangle`] itself.
+    const SPECIAL: u32 = 4;
+}
+
+/// Looks for what is in a mesh, for all rays of a packet.
+pub(super) trait Visit {
+    /// How far each ray reaches now.
+    fn reach(&self) -> &Lanes;
+
+    /// Takes the hits of one triangle.
+    fn hit(&mut self, triangle: u32, hits: &LaneHits);
+}
+
+/// Shows each triangle that a ray of a packet meets to `visit`.
+#[inline(always)]
+pub(super) fn intersect(tree: &MeshTree, rays: &LaneRays, shear: &Shear, visit: &mut impl Visit) {
+    let mut farthest = largest(visit.reach());
+    tree.tree().walk(&rays.bundle(), &mut farthest, |leaf, farthest| {
+        let (near, mut limit, any) = rays.enter(&leaf, visit.reach());
+        if any {
+            for block in tree.blocks(&leaf) {
+                for place in 0..WIDTH {
+                    let Some((triangle, vertices)) = block.triangle(place) else { break };
+                    if let Some(hits) = shear.triangle(rays, &vertices, &near, &limit) {
+                        visit.hit(triangle, &hits);
+                        let reach = visit.reach();
+                        for i in 0..LANES {
+                            limit[i] = min(limit[i], reach[i]);
+                        }
+                    }
+                }
+            }
+            *farthest = largest(visit.reach());
+        }
+        *farthest >= 0.0
+    });
+}
+
+impl Shear {
+    /// Where the rays meet a triangle within `limit`, as [`Ray::triangle`] and the mesh tree say; `None` if none does.
+    #[inline(always)]
+    fn triangle(&self, rays: &LaneRays, vertices: &[Vec3; 3], near: &Lanes, limit: &Lanes) -> Option<LaneHits> {
+        let [kx, ky, kz] = self.axes.map(|axis| axis.min(2));
+        let [ox, oy, oz] = [kx, ky, kz].map(|axis| &rays.origin[axis]);
+        let [[ax, ay, az], [bx, by, bz], [cx, cy, cz]] =
+            vertices.map(|vertex| [kx, ky, kz].map(|axis| vertex.to_array()[axis]));
+        let (mut us, mut vs, mut ws) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
+        let mut any = 0;
+        for i in 0..LANES {
+            let (sx, sy) = (self.x[i], self.y[i]);
+            let (a, b, c) = (az - oz[i], bz - oz[i], cz - oz[i]);
+            let (ax, ay) = (ax - ox[i] - sx * a, ay - oy[i] - sy * a);
+            let (bx, by) = (bx - ox[i] - sx * b, by - oy[i] - sy * b);
+            let (cx, cy) = (cx - ox[i] - sx * c, cy - oy[i] - sy * c);
+            let u = cx * by - cy * bx;
+            let v = ax * cy - ay * cx;
+            let w = bx * ay - by * ax;
+            let outside = (min(min(u, v), w) < 0.0) & (max(max(u, v), w) > 0.0);
+            let edge = (u == 0.0) | (v == 0.0) | (w == 0.0);
+            any |= u32::from((!outside | edge) & (limit[i] >= 0.0));
+            us[i] = u;
+            vs[i] = v;
+            ws[i] = w;
+        }
+        if any == 0 {
+            return None;
+        }
+        let mut hits = LaneHits { t: [0.0; LANES], u: [0.0; LANES], v: [0.0; LANES], side: [0; LANES] };
+        let mut any = 0;
+        for i in 0..LANES {
+            let (u, v, w) = (us[i], vs[i], ws[i]);
+            let sz = self.z[i];
+            let (a, b, c) = (sz * (az - oz[i]), sz * (bz - oz[i]), sz * (cz - oz[i]));
+            let outside = (min(min(u, v), w) < 0.0) & (max(max(u, v), w) > 0.0);
+            let edge = (u == 0.0) | (v == 0.0) | (w == 0.0);
+            let determinant = u + v + w;
+            let t = (u * a + v * b + w * c) / determinant;
+            let farthest = max(max(a.abs(), b.abs()), c.abs());
+            let special = edge | (min(min(a, b), c) <= farthest * NOT_AHEAD);
+            // See the head of `tree`.
+            let entered = max(t, near[i]);
+            let met = !outside & (t > 0.0) & (entered <= limit[i]);
+            let side = if determinant > 0.0 { LaneHits::FRONT } else { LaneHits::BACK };
+            let side = if met { side } else { LaneHits::NONE };
+            let asks = special & (met | (edge & (limit[i] >= 0.0)));
+            let side = if asks { LaneHits::SPECIAL } else { side };
+            hits.t[i] = entered;
+            hits.u[i] = v / determinant;
+            hits.v[i] = w / determinant;
+            hits.side[i] = side;
+            any |= side;
+        }
+        if any & LaneHits::SPECIAL != 0 {
+            any = ask(rays, vertices, near, limit, &mut hits);
+        }
+        (any != 0).then_some(hits)
+    }
+}
+
+/// Replaces special lanes by what the single ray meets; whether any lane meets the triangle.
+#[cold]
+fn ask(rays: &LaneRays, vertices: &[Vec3; 3], near: &Lanes, limit: &Lanes, hits: &mut LaneHits) -> u32 {
+    for i in 0..LANES {
+        if hits.side[i] & LaneHits::SPECIAL == 0 {
+            continue;
+        }
+        hits.side[i] = LaneHits::NONE;
+        if let Some(hit) = rays.ray(i).triangle(vertices, limit[i]) {
+            let t = hit.t.max(near[i]);
+            if t <= limit[i] {
+                hits.side[i] = if hit.front { LaneHits::FRONT } else { LaneHits::BACK };
+                (hits.t[i], hits.u[i], hits.v[i]) = (t, hit.u, hit.v);
+            }
+        }
+    }
+    hits.side.iter().fold(0, |any, side| any | side)
+}
+
+/// The same as [`intersect`] for rays that are no packet in the mesh's space.
+#[inline(never)]
+pub(super) fn one_by_one(tree: &MeshTree, rays: &LaneRays, visit: &mut impl Visit) {
+    for lane in 0..LANES {
+        let mut reach = visit.reach()[lane];
+        if reach < 0.0 {
+            continue;
+        }
+        tree.intersect(&rays.ray(lane), &mut reach, |triangle, hit, reach| {
+            let mut hits =
+                LaneHits { t: [0.0; LANES], u: [0.0; LANES], v: [0.0; LANES], side: [LaneHits::NONE; LANES] };
+            hits.side[lane] = if hit.front { LaneHits::FRONT } else { LaneHits::BACK };
+            (hits.t[lane], hits.u[lane], hits.v[lane]) = (hit.t, hit.u, hit.v);
+            visit.hit(triangle, &hits);
+            *reach = visit.reach()[lane];
+            *reach >= 0.0
+        });
+    }
+}
