@@ -17,6 +17,7 @@ mod film;
 mod footprint;
 mod light;
 mod line;
+mod packets;
 mod trace;
 // ... and the whole.
 mod flicker;
