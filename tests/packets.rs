@@ -38,9 +38,8 @@ fn mesh() -> impl Strategy<Value = Mesh> {
 }
 
 fn placement() -> impl Strategy<Value = DAffine3> {
-    let turn = (vector(), 0.0..7.0f64).prop_map(|(axis, angle)| {
-        DQuat::from_axis_angle(axis.as_dvec3().try_normalize().unwrap_or(DVec3::Y), angle)
-    });
+    let turn = (vector(), 0.0..7.0f64)
+        .prop_map(|(axis, angle)| DQuat::from_axis_angle(axis.as_dvec3().try_normalize().unwrap_or(DVec3::Y), angle));
     let moved = (vector(), 0.2..3.0f64, any::<bool>(), turn).prop_map(|(by, scale, mirrored, turn)| {
         let scale = DVec3::new(if mirrored { -scale } else { scale }, 1.0, 1.0);
         DAffine3::from_scale_rotation_translation(scale, turn, by.as_dvec3())
@@ -168,9 +167,11 @@ fn what_a_ray_meets_first_is_least_among_all_triangles() {
                     true
                 });
                 let corners = |triangle: &[u32; 3]| triangle.map(|vertex| mesh.positions[vertex as usize]);
-                let all = mesh.triangles.iter().zip(0..).filter_map(|(triangle, id)| {
-                    Some((ray.triangle(&corners(triangle), f32::INFINITY)?.t, id))
-                });
+                let all = mesh
+                    .triangles
+                    .iter()
+                    .zip(0..)
+                    .filter_map(|(triangle, id)| Some((ray.triangle(&corners(triangle), f32::INFINITY)?.t, id)));
                 let expected = all.min_by(|a, b| a.partial_cmp(b).expect("distances are numbers"));
                 prop_assert_eq!(least, expected);
             }

@@ -148,8 +148,13 @@ impl LaneRays {
     #[inline(always)]
     pub fn bundle(&self) -> Bundle {
         let bounds = |lanes: &Lanes| lanes.iter().fold((lanes[0], lanes[0]), |(a, b), &x| (min(a, x), max(b, x)));
-        let mut bundle =
-            Bundle { near: [0, 1, 2], far: [3, 4, 5], origin: [[Vec4::ZERO; 2]; 3], inverse: [[Vec4::ZERO; 2]; 3], mixed: [false; 3] };
+        let mut bundle = Bundle {
+            near: [0, 1, 2],
+            far: [3, 4, 5],
+            origin: [[Vec4::ZERO; 2]; 3],
+            inverse: [[Vec4::ZERO; 2]; 3],
+            mixed: [false; 3],
+        };
         for axis in 0..3 {
             let (low, high) = bounds(&self.origin[axis]);
             let (least, most) = bounds(&self.inverse[axis]);

@@ -8,7 +8,10 @@
 
 use std::ops::Range;
 
+use smallvec::SmallVec;
+
 use super::cone::Cone;
+use super::packet::{LANES, RayStart};
 use super::ray_tree::{Run, TreeNode, WaveHit, WaveRay};
 use super::surface::Surface;
 use super::triangle::Ray;
@@ -30,6 +33,9 @@ const RUN_SAMPLES: usize = 4096;
 const RUN_SAMPLES_BRANCHING: usize = 1024;
 /// Most surfaces of opacity 0 that a ray passes before it is taken to leave the scene.
 pub(super) const MOST_INVISIBLE: u32 = 256;
+
+/// What the rays of a packet met, as far as they are one.
+type Packet = [Option<Option<Hit>>; LANES];
 
 /// Rays traced, by kind, for `--stats`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -234,12 +240,18 @@ impl<'a> TileTracer<'a> {
     fn find_hits(&self, wave: &[WaveRay], run: &mut Run, work: &mut Work) -> Vec<WaveHit> {
         let mut hits = Vec::with_capacity(wave.len());
         let mut list = Vec::new();
-        for wave_ray in wave {
+        let mut packet: Packet = [None; LANES];
+        for (index, wave_ray) in wave.iter().enumerate() {
+            if index % LANES == 0 {
+                packet = self.packet_hits(&wave[index..(index + LANES).min(wave.len())], run);
+            }
             let Run { nodes, behind, .. } = run;
             let node = &mut nodes[wave_ray.node as usize];
             let kind = work.count(node.kind);
             let ray = Ray::new(wave_ray.origin, wave_ray.direction);
-            let found = if wave_ray.passed >= MOST_INVISIBLE {
+            let found = if let Some(found) = packet[index % LANES] {
+                found
+            } else if wave_ray.passed >= MOST_INVISIBLE {
                 None
             } else if self.keeps_list(node.path) {
                 self.surface_list(&ray, kind, wave_ray, &[], &mut list);
@@ -258,6 +270,20 @@ impl<'a> TileTracer<'a> {
             }
         }
         hits
+    }
+
+    /// What camera rays meet that start together; `None` for rays that are to be traced one by one: those of mirrors and glass
+    /// scatter, and those with lists or behind something invisible want more than the closest hit.
+    fn packet_hits(&self, rays: &[WaveRay], run: &Run) -> Packet {
+        let is_plain = |ray: &WaveRay| {
+            let node = &run.nodes[ray.node as usize];
+            node.kind == PathKind::Camera && ray.after.is_none() && !self.keeps_list(node.path)
+        };
+        if !rays.iter().all(is_plain) {
+            return [None; LANES];
+        }
+        let starts: SmallVec<[RayStart; LANES]> = rays.iter().map(|ray| (ray.origin, ray.direction)).collect();
+        self.world.closest_of(&starts, RayKinds::CAMERA).map(Some)
     }
 
     /// A hit on its way to be shaded.

@@ -179,13 +179,20 @@ impl pulp::WithSimd for Closest<'_> {
     fn with_simd<S: pulp::Simd>(self, _: S) -> Self::Output {
         let Self { world, rays, kind, mut found } = self;
         let culls = kind != RayKinds::SHADOW;
-        each_object(world, rays, kind, &mut found, |found| &found.t, |found, id, object, placed, near, limit| {
-            let mut search = InObject { found, id, object, culls, near, reach: limit };
-            match placed.shear() {
-                Some(shear) => intersect(&object.tree, placed, &shear, &mut search),
-                None => packet::one_by_one(&object.tree, placed, &mut search),
-            }
-        })?;
+        each_object(
+            world,
+            rays,
+            kind,
+            &mut found,
+            |found| &found.t,
+            |found, id, object, placed, near, limit| {
+                let mut search = InObject { found, id, object, culls, near, reach: limit };
+                match placed.shear() {
+                    Some(shear) => intersect(&object.tree, placed, &shear, &mut search),
+                    None => packet::one_by_one(&object.tree, placed, &mut search),
+                }
+            },
+        )?;
         Some(found)
     }
 }
@@ -239,13 +246,20 @@ impl<F: Fn(MaterialId) -> bool> pulp::WithSimd for Blocked<'_, F> {
         let Self { world, rays, reach, opaque } = self;
         let mut ways = Ways { way: [Way::Clear; LANES], reach };
         let kind = RayKinds::SHADOW;
-        each_object(world, rays, kind, &mut ways, |ways| &ways.reach, |ways, _, object, placed, _, limit| {
-            let mut search = InTheWay { ways, object, reach: limit, opaque: &opaque };
-            match placed.shear() {
-                Some(shear) => intersect(&object.tree, placed, &shear, &mut search),
-                None => packet::one_by_one(&object.tree, placed, &mut search),
-            }
-        })?;
+        each_object(
+            world,
+            rays,
+            kind,
+            &mut ways,
+            |ways| &ways.reach,
+            |ways, _, object, placed, _, limit| {
+                let mut search = InTheWay { ways, object, reach: limit, opaque: &opaque };
+                match placed.shear() {
+                    Some(shear) => intersect(&object.tree, placed, &shear, &mut search),
+                    None => packet::one_by_one(&object.tree, placed, &mut search),
+                }
+            },
+        )?;
         Some(ways.way)
     }
 }
