@@ -205,8 +205,20 @@ impl Lanes {
         types: Option<&TypeRules>,
     ) -> u32 {
         let end = self.keys.end_of_outranking(target.node.rank);
-        let Self { columns, scores, certain, .. } = self;
-        self.arch.dispatch(Score::<OWN> { columns, scores, certain: *certain, target, end, tests, mixed, types })
+        let Self { columns, scores, certain, arch, .. } = self;
+        let loops = Loop { columns, scores, target, end, tests, types };
+        // Each loop is dispatched by itself: a function that held them all would be too large to be vectorised well.
+        match (types.is_some(), *certain, mixed, tests.reads_facets(), tests.reads_shapes) {
+            (false, true, ..) => arch.dispatch(Score::<OWN, { Differ::CERTAIN }, false>(loops)),
+            (false, _, false, false, false) => arch.dispatch(Score::<OWN, { Differ::BY_IDS }, false>(loops)),
+            (false, _, false, false, true) => arch.dispatch(Score::<OWN, { Differ::BY_SHAPES }, false>(loops)),
+            (false, _, false, true, _) => arch.dispatch(Score::<OWN, { Differ::BY_FACETS }, false>(loops)),
+            (false, _, true, ..) => arch.dispatch(Score::<OWN, { Differ::MIXED }, false>(loops)),
+            (true, _, false, false, false) => arch.dispatch(Score::<OWN, { Differ::BY_IDS }, true>(loops)),
+            (true, _, false, false, true) => arch.dispatch(Score::<OWN, { Differ::BY_SHAPES }, true>(loops)),
+            (true, _, false, true, _) => arch.dispatch(Score::<OWN, { Differ::BY_FACETS }, true>(loops)),
+            (true, _, true, ..) => arch.dispatch(Score::<OWN, { Differ::MIXED }, true>(loops)),
+        }
     }
 
     /// The neighbours that the last scoring gave a score.
@@ -221,31 +233,28 @@ impl Lanes {
     }
 }
 
-/// A loop over all neighbours.
-struct Score<'a, const OWN: bool> {
+/// What a loop over all neighbours reads and writes.
+struct Loop<'a> {
     columns: &'a Columns,
     scores: &'a mut [u32],
-    certain: bool,
     target: LaneTarget<'a>,
     /// Keys below this outrank the target.
     end: u32,
     tests: &'a Tests,
-    /// Whether each neighbour is tested as its own column of tests says.
-    mixed: bool,
     /// What types change; no neighbour is certain then.
     types: Option<&'a TypeRules>,
 }
 
-impl<const OWN: bool> pulp::WithSimd for Score<'_, OWN> {
+/// A loop over all neighbours; `TYPED` if types change radii.
+struct Score<'a, const OWN: bool, const DIFFER: u8, const TYPED: bool>(Loop<'a>);
+
+impl<const OWN: bool, const DIFFER: u8, const TYPED: bool> pulp::WithSimd for Score<'_, OWN, DIFFER, TYPED> {
     /// The best score.
     type Output = u32;
 
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) -> u32 {
-        match self.types {
-            None => self.choose::<false>(),
-            Some(_) => self.choose::<true>(),
-        }
+        self.run()
     }
 }
 
@@ -260,26 +269,10 @@ impl Differ {
     const MIXED: u8 = 4;
 }
 
-impl<const OWN: bool> Score<'_, OWN> {
+impl<const OWN: bool, const DIFFER: u8, const TYPED: bool> Score<'_, OWN, DIFFER, TYPED> {
     #[inline(always)]
-    fn choose<const TYPED: bool>(self) -> u32 {
-        if self.certain {
-            self.run::<{ Differ::CERTAIN }, TYPED>()
-        } else if self.mixed {
-            self.run::<{ Differ::MIXED }, TYPED>()
-        } else if self.tests.reads_facets() {
-            self.run::<{ Differ::BY_FACETS }, TYPED>()
-        } else if self.tests.reads_shapes {
-            self.run::<{ Differ::BY_SHAPES }, TYPED>()
-        } else {
-            self.run::<{ Differ::BY_IDS }, TYPED>()
-        }
-    }
-
-    #[inline(always)]
-    fn run<const DIFFER: u8, const TYPED: bool>(self) -> u32 {
-        let Self { columns, scores, target: LaneTarget { node: target, facet: own_facet }, end, tests, types, .. } =
-            self;
+    fn run(self) -> u32 {
+        let Loop { columns, scores, target: LaneTarget { node: target, facet: own_facet }, end, tests, types } = self.0;
         let count = scores.len();
         let ids = if DIFFER >= Differ::BY_IDS { count } else { 0 };
         let shapes = if DIFFER >= Differ::BY_SHAPES { count } else { 0 };
@@ -307,7 +300,6 @@ impl<const OWN: bool> Score<'_, OWN> {
             let mut differs = true;
             let mut reasons = LaneReasons::default();
             if DIFFER >= Differ::BY_IDS {
-                reasons.miss = !own_hit | (object[i] == 0);
                 reasons.object = tests.object & (object[i] != own.object);
                 reasons.shader = tests.shader & (shader[i] != own.shader);
                 differs = reasons.object | reasons.shader;
@@ -318,11 +310,11 @@ impl<const OWN: bool> Score<'_, OWN> {
                     [own.normal[0] - normal[0][i], own.normal[1] - normal[1][i], own.normal[2] - normal[2][i]];
                 let [r, g, b] =
                     [own.feature[0] - feature[0][i], own.feature[1] - feature[1][i], own.feature[2] - feature[2][i]];
-                reasons.uv = !reasons.miss & (u * u + v * v > tests.uv_squared);
-                reasons.normal = !reasons.miss & (x * x + y * y + z * z > tests.chord_squared);
-                let colors = (r.abs() > tests.feature) | (g.abs() > tests.feature) | (b.abs() > tests.feature);
-                reasons.feature = !reasons.miss & colors;
-                differs |= reasons.uv | reasons.normal | reasons.feature;
+                reasons.uv = u * u + v * v > tests.uv_squared;
+                reasons.normal = x * x + y * y + z * z > tests.chord_squared;
+                reasons.feature = (r.abs() > tests.feature) | (g.abs() > tests.feature) | (b.abs() > tests.feature);
+                let shapes = reasons.uv | reasons.normal | reasons.feature;
+                differs |= own_hit & (object[i] != 0) & shapes;
             }
             if DIFFER >= Differ::BY_FACETS {
                 let overlaps = own_facet.overlaps(&facet.get(i), distance_squared, tests.overlap);
@@ -331,6 +323,7 @@ impl<const OWN: bool> Score<'_, OWN> {
             }
             let mut radius_squared = if OWN { target.radius_squared } else { radius_squared[i] };
             if let (true, Some(types)) = (TYPED, types) {
+                reasons.miss = !own_hit | (object[i] == 0);
                 radius_squared = reasons.radius_squared(types, radius_squared);
             }
 

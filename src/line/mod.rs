@@ -162,10 +162,10 @@ pub fn find_lines(
                 break;
             }
         };
-        for (sample, line) in style::style(&at_path, &targets, &found, rules, scripts.as_deref_mut(), &mut gate) {
+        style::style(&at_path, &targets, &found, rules, scripts.as_deref_mut(), &mut gate, |sample, line| {
             lined[sample as usize] = true;
             lines.push((sample, line));
-        }
+        });
     }
     lines.sort_unstable_by_key(|&(sample, _)| sample);
     counts.lined_samples = lines.len() as u64;

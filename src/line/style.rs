@@ -66,8 +66,8 @@ struct Drawn {
 /// The lines of a sample, front to back: mostly one.
 type DrawnLines = SmallVec<[Drawn; 1]>;
 
-/// The lines that targets see, in their colours, with their samples. What scripts gave that is no number is counted by
-/// `shader` value.
+/// Hands over the lines that targets see, in their colours, with their samples. What scripts gave that is no number is
+/// counted by `shader` value.
 pub(super) fn style(
     window: &PathWindow<'_>,
     targets: &PathTile<'_>,
@@ -75,13 +75,23 @@ pub(super) fn style(
     rules: &Rules,
     scripts: Option<&mut (dyn LineScripts + '_)>,
     gate: &mut Vec<GateCounts>,
-) -> Vec<(u32, SeenLine)> {
+    mut see: impl FnMut(u32, SeenLine),
+) {
     let styler = Styler { window, targets, rules };
-    let mut drawn: Vec<DrawnLines> = found.iter().map(|found| styler.drawn(found)).collect();
-    if let Some(scripts) = scripts.filter(|_| !rules.no_scripts()) {
-        styler.ask_scripts(found, &mut drawn, scripts, gate);
+    let mut mix = |found: &Found, drawn: &[Drawn]| {
+        if let Some((sample, line)) = styler.mix(found, drawn) {
+            see(sample, line);
+        }
+    };
+    match scripts.filter(|_| !rules.no_scripts()) {
+        // Where nobody asks for all lines at once, they need not be kept.
+        None => found.iter().for_each(|found| mix(found, &styler.drawn(found))),
+        Some(scripts) => {
+            let mut drawn: Vec<DrawnLines> = found.iter().map(|found| styler.drawn(found)).collect();
+            styler.ask_scripts(found, &mut drawn, scripts, gate);
+            found.iter().zip(&drawn).for_each(|(found, drawn)| mix(found, drawn));
+        }
     }
-    found.iter().zip(&drawn).filter_map(|(found, drawn)| styler.mix(found, drawn)).collect()
 }
 
 struct Styler<'s, 'a> {
@@ -102,6 +112,7 @@ impl Styler<'_, '_> {
     }
 
     /// The lines of a sample before scripts, front to back.
+    #[inline]
     fn drawn(&self, found: &Found) -> DrawnLines {
         let pairs = std::iter::once(&found.pair).chain(&found.behind);
         pairs.filter_map(|pair| self.drawn_pair(found, pair)).collect()
@@ -199,6 +210,7 @@ impl Styler<'_, '_> {
     }
 
     /// A sample's colour with its lines. What else is told of the line is of the one in front.
+    #[inline]
     fn mix(&self, found: &Found, drawn: &[Drawn]) -> Option<(u32, SeenLine)> {
         let Self { targets, .. } = self;
         let sample = targets.nodes.rows.sample(found.row);

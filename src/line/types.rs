@@ -57,7 +57,7 @@ impl TypeRules {
     }
 }
 
-/// Why a neighbour differs, lane by lane: the arguments of [`TypeRules::radius_squared_of`] without a branch.
+/// Why a neighbour differs, lane by lane; with a miss, uv, normals and feature colours mean nothing. The arguments of [`TypeRules::radius_squared_of`] without a branch.
 #[derive(Clone, Copy, Default)]
 pub(super) struct LaneReasons {
     pub miss: bool,
@@ -76,9 +76,9 @@ impl LaneReasons {
         let Self { miss, object, overlap, shader, normal, uv, feature } = self;
         let mut radius_squared = asked_squared;
         for (reason, kind) in [
-            (feature, LineType::Feature),
-            (uv, LineType::Uv),
-            (normal, LineType::Crease),
+            (feature & !miss, LineType::Feature),
+            (uv & !miss, LineType::Uv),
+            (normal & !miss, LineType::Crease),
             (shader, LineType::Material),
             (overlap, LineType::Overlap),
             (object, LineType::Silhouette),
