@@ -1,4 +1,4 @@
-//! The fuzz targets of `tests/fuzz`, run on inputs that a seed makes from the corpus.
+//! The fuzz targets of `tests/fuzz`, run on inputs that a seed makes from small files.
 
 #[path = "../fuzz/inputs.rs"]
 mod inputs;
@@ -96,13 +96,13 @@ fn change(bytes: &mut Vec<u8>, others: &[Vec<u8>], dice: &mut Dice) {
     }
 }
 
-/// The files of a folder of the corpus, sorted.
-fn corpus(name: &str) -> Vec<Vec<u8>> {
-    let folder = root().join("tests/fuzz/corpus").join(name);
+/// The files of a folder of `tests/fuzz/seeds`, sorted.
+fn seeds_of(name: &str) -> Vec<Vec<u8>> {
+    let folder = root().join("tests/fuzz/seeds").join(name);
     let entries = std::fs::read_dir(&folder).unwrap_or_else(|error| panic!("{}: {error}", folder.display()));
     let mut paths: Vec<_> = entries.map(|entry| entry.expect("it can be listed").path()).collect();
     paths.sort();
-    paths.iter().map(|path| std::fs::read(path).expect("the corpus can be read")).collect()
+    paths.iter().map(|path| std::fs::read(path).expect("seeds can be read")).collect()
 }
 
 /// Runs a target on inputs made by `make` from their numbers; all that panic are told at once.
@@ -135,9 +135,9 @@ fn changed(seeds: &[Vec<u8>], dice: &mut Dice) -> Vec<u8> {
 
 #[test]
 fn scene_files_give_a_scene_or_diagnostics() {
-    let seeds = corpus("scene_file");
+    let seeds = seeds_of("scene_file");
     for seed in &seeds {
-        assert!(inputs::scene_file(seed), "a scene of the corpus is not read:\n{}", String::from_utf8_lossy(seed));
+        assert!(inputs::scene_file(seed), "a scene of the seeds is not read:\n{}", String::from_utf8_lossy(seed));
     }
     let accepted = run(1500, |dice| changed(&seeds, dice), inputs::scene_file);
     assert!(accepted > 100, "{accepted}");
@@ -145,9 +145,9 @@ fn scene_files_give_a_scene_or_diagnostics() {
 
 #[test]
 fn models_give_a_scene_or_diagnostics() {
-    let texts = corpus("model");
+    let texts = seeds_of("model");
     for seed in &texts {
-        assert!(inputs::model(seed), "a model of the corpus is not read:\n{}", String::from_utf8_lossy(seed));
+        assert!(inputs::model(seed), "a model of the seeds is not read:\n{}", String::from_utf8_lossy(seed));
     }
     let make = |dice: &mut Dice| {
         let text = changed(&texts, dice);
