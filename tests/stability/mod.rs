@@ -1,8 +1,7 @@
 //! Hard cases stay numerically stable (DESIGN section 7).
 //!
 //! Each file holds a family of cases. A case measures one figure, a number of faults or a largest error, the same in every
-//! run and on every machine; it must not exceed its bound. The table of all of them is a golden text, and the README
-//! shows it.
+//! run and on every machine; it must not exceed its bound. Where a bound is that of a known limit, the table says so; such bounds are there to be lowered.
 //!
 //! `TUSCHE_RAYS=10000000` traces that many rays in cases that count leaks, `TUSCHE_SCENES=1000` makes that many random
 //! scenes, `TUSCHE_CASE=glass` measures only cases whose name holds the word.
@@ -26,7 +25,7 @@ use std::panic::catch_unwind;
 use rayon::prelude::*;
 use tusche::math::Vec3;
 
-use crate::common::{Picture, golden, root};
+use crate::common::Picture;
 use crate::trace::random;
 
 /// A hard case.
@@ -114,9 +113,4 @@ fn every_hard_case_stays_within_its_bound() {
     }
     println!("{table}");
     assert!(broken.is_empty(), "out of bounds:\n{}", broken.join("\n"));
-    if word.is_none() {
-        golden(&root().join("tests/golden/stability/table.md"), &table);
-        let readme = std::fs::read_to_string(root().join("README.md")).expect("the README is there");
-        assert!(readme.contains(&table), "the README must show tests/golden/stability/table.md as it is");
-    }
 }
