@@ -14,28 +14,28 @@ pub const CASES: &[Case] = &[
     Case {
         name: "rays from inside at edges and vertices of a fine sphere",
         wrong: "black dots in a room",
-        unit: "leaks in 300 000 rays",
+        unit: "leaks in 100 000 rays",
         bound: 0.0,
         figure: sphere_from_inside,
     },
     Case {
         name: "rays from outside at edges and vertices of a fine sphere",
         wrong: "dots of background on a body, each with its outline",
-        unit: "leaks in 300 000 rays",
+        unit: "leaks in 100 000 rays",
         bound: 0.0,
         figure: sphere_from_outside,
     },
     Case {
         name: "rays from above at edges and vertices of a terrain of 10 km",
         wrong: "dots of sky on the ground",
-        unit: "leaks in 300 000 rays",
+        unit: "leaks in 100 000 rays",
         bound: 0.0,
         figure: || terrain(1.0),
     },
     Case {
         name: "rays from below at edges and vertices of a terrain of 10 km",
         wrong: "light through the ground",
-        unit: "leaks in 300 000 rays",
+        unit: "leaks in 100 000 rays",
         bound: 0.0,
         figure: || terrain(-1.0),
     },
@@ -57,7 +57,7 @@ pub const CASES: &[Case] = &[
 
 /// Rays in batches of 1000, each with its own random numbers; the sum of what `leaks` counts in a batch.
 fn in_batches(leaks: impl Fn(&mut u64) -> u32 + Sync) -> f64 {
-    let batches = count_from("TUSCHE_RAYS", 300_000) / 1000;
+    let batches = count_from("TUSCHE_RAYS", 100_000) / 1000;
     f64::from((1..=batches).into_par_iter().map(|batch| leaks(&mut (batch * 7919))).sum::<u32>())
 }
 

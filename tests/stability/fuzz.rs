@@ -141,7 +141,7 @@ fn scene_files_give_a_scene_or_diagnostics() {
     for seed in &seeds {
         assert!(inputs::scene_file(seed), "a scene of the seeds is not read:\n{}", String::from_utf8_lossy(seed));
     }
-    run(1500, |dice| changed(&seeds, dice), inputs::scene_file);
+    run(600, |dice| changed(&seeds, dice), inputs::scene_file);
 }
 
 #[test]
@@ -161,7 +161,7 @@ fn models_give_a_scene_or_diagnostics() {
         }
         binary
     };
-    run(3000, make, inputs::model);
+    run(1000, make, inputs::model);
 }
 
 /// A text as a `.glb` with a buffer.
@@ -188,7 +188,7 @@ fn any_samples_have_the_same_lines_by_search_and_by_brute_force() {
         // Small bytes are frequent, so that values are often equal and, at 0, any float.
         (0..length).map(|_| if dice.below(3) == 0 { dice.below(4) } else { dice.below(256) } as u8).collect()
     };
-    run(1500, make, |bytes| {
+    run(600, make, |bytes| {
         inputs::samples(bytes);
         true
     });

@@ -16,7 +16,7 @@ pub const CASES: &[Case] = &[Case {
     unit: "values not finite or not the same",
     bound: 0.0,
     figure: || {
-        let scenes = count_from("TUSCHE_SCENES", 60);
+        let scenes = count_from("TUSCHE_SCENES", 24);
         (1..=scenes).into_par_iter().map(faults).sum::<usize>() as f64
     },
 }];
