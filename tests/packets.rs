@@ -158,8 +158,8 @@ fn what_a_ray_meets_first_is_least_among_all_triangles() {
             let tree = tusche::trace::mesh_tree::MeshTree::new(&mesh);
             for (origin, direction) in rays {
                 let ray = Ray::new(origin, direction);
-                let mut least: Option<(f32, u32)> = None;
-                tree.intersect(&ray, &mut f32::INFINITY, |id, hit, t_max| {
+                let (mut least, mut far): (Option<(f32, u32)>, f32) = (None, f32::INFINITY);
+                tree.intersect(&ray, &mut far, |id, hit, t_max| {
                     if least.is_none_or(|least| (hit.t, id) < least) {
                         least = Some((hit.t, id));
                         *t_max = hit.t;

@@ -22,6 +22,7 @@ mod trace;
 // ... and the whole.
 mod flicker;
 mod same_bits;
+mod stability;
 mod surfaces;
 mod truth;
 mod why;

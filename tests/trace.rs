@@ -14,7 +14,7 @@ use tusche::trace::surface::Surface;
 use tusche::trace::triangle::Ray;
 use tusche::trace::world::Hit;
 
-fn builder() -> SceneBuilder {
+pub fn builder() -> SceneBuilder {
     let mut builder = SceneBuilder::default();
     let projection = Projection::Perspective { fov_y: 0.7 };
     let camera = Camera::look_at("camera", projection, DVec3::Z * 5.0, DVec3::ZERO, DVec3::Y);
@@ -33,7 +33,7 @@ fn builder() -> SceneBuilder {
     builder
 }
 
-fn place(builder: &mut SceneBuilder, mesh: Mesh, world_from_object: DAffine3) {
+pub fn place(builder: &mut SceneBuilder, mesh: Mesh, world_from_object: DAffine3) {
     let mesh = builder.add_mesh(mesh);
     builder.add_object(Object {
         name: "object".into(),
@@ -48,14 +48,14 @@ fn place(builder: &mut SceneBuilder, mesh: Mesh, world_from_object: DAffine3) {
     });
 }
 
-fn world(builder: SceneBuilder) -> (Scene, World) {
+pub fn world(builder: SceneBuilder) -> (Scene, World) {
     let scene = builder.build().unwrap_or_else(|faults| panic!("{faults}"));
     let world = World::new(&scene, &[false]);
     (scene, world)
 }
 
 /// A closed sphere of triangles around the origin: its vertices are shared, so its edges have no gaps.
-fn ball(rings: u32, segments: u32, radius: f32) -> Mesh {
+pub fn ball(rings: u32, segments: u32, radius: f32) -> Mesh {
     let mut mesh = Mesh { name: "ball".into(), ..Mesh::default() };
     mesh.positions.push(Vec3::Y * radius);
     for ring in 1..rings {
@@ -89,7 +89,7 @@ fn ball(rings: u32, segments: u32, radius: f32) -> Mesh {
 }
 
 /// Numbers in −1 … 1, the same in every run.
-fn random(state: &mut u64) -> f32 {
+pub fn random(state: &mut u64) -> f32 {
     *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
     ((*state >> 40) as f32 / (1u64 << 23) as f32) - 1.0
 }
