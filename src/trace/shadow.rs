@@ -3,30 +3,17 @@
 //! Shadow rays go straight on through see-through and transmissive surfaces and lose what those do not let pass; they
 //! are neither bent nor tinted, and reflection at glass takes nothing from them.
 
-use smallvec::SmallVec;
-
-use super::packet::{LANES, RayStart};
 use super::ray_tree::{WaveHit, WaveRay};
 use super::surface::Surface;
 use super::triangle::Ray;
 use super::wave::{TileTracer, TraceContext, Work, value};
 use super::world::Hit;
-use super::world_packet::Way;
 use crate::clock::CpuClock;
 use crate::math::Vec3;
 use crate::scene::ids::MaterialId;
 use crate::shade::batch::{HitBatch, LightSample, OutputBatch};
 use crate::shade::bsdf::unit;
 use crate::shade::{InputSet, OutputSet, PathKind};
-
-/// Shadow rays towards one light that wait to be traced together.
-#[derive(Default)]
-struct Packet {
-    starts: SmallVec<[RayStart; LANES]>,
-    reaches: SmallVec<[f32; LANES]>,
-    /// Places of their light samples.
-    samples: SmallVec<[usize; LANES]>,
-}
 
 impl TileTracer<'_> {
     /// What every light gives each hit of a group, shadows included: `lights` samples a hit, hit by hit.
@@ -36,75 +23,37 @@ impl TileTracer<'_> {
         context: &mut TraceContext<'_>,
         work: &mut Work,
     ) -> Vec<LightSample> {
-        let lights = self.lighting.len();
-        let mut samples = Vec::with_capacity(group.len() * lights);
-        for hit in group {
-            samples.extend((0..lights).map(|light| self.lighting.sample(light, hit.surface.position).0));
-        }
+        let mut samples = Vec::with_capacity(group.len() * self.lighting.len());
+        let mut passed = Vec::new();
         let mut see_through = Vec::new();
-        for light in 0..lights {
-            let mut packet = Packet::default();
-            for (index, hit) in group.iter().enumerate() {
-                let surface = &hit.surface;
-                let place = index * lights + light;
-                let sample = &mut samples[place];
+        for hit in group {
+            let surface = &hit.surface;
+            for light in 0..self.lighting.len() {
+                let (mut sample, distance) = self.lighting.sample(light, surface.position);
                 if sample.direction.dot(surface.geometric_normal) <= 0.0 {
                     // In its own shadow.
                     sample.visibility = 0.0;
                 } else if self.lighting.casts_shadows(light) && sample.radiance != Vec3::ZERO {
                     work.rays.shadow += 1;
-                    let distance = self.lighting.sample(light, surface.position).1;
-                    packet.starts.push((surface.leave(sample.direction), sample.direction));
+                    let origin = surface.leave(sample.direction);
+                    let ray = Ray::new(origin, sample.direction);
+                    let opaque = |id: MaterialId| self.plan.materials[id.index()].blocks_light();
                     // The light itself is no obstacle.
-                    packet.reaches.push(distance * (1.0 - 1e-5));
-                    packet.samples.push(place);
-                    if packet.starts.len() == LANES {
-                        self.trace_shadows(&mut packet, &mut samples, &mut see_through);
+                    let reach = distance * (1.0 - 1e-5);
+                    if self.world.blocked(&ray, reach, opaque, &mut passed) {
+                        sample.visibility = 0.0;
+                    }
+                    if sample.visibility > 0.0 {
+                        see_through.extend(passed.iter().map(|hit| (samples.len(), ray, *hit)));
                     }
                 }
+                samples.push(sample);
             }
-            self.trace_shadows(&mut packet, &mut samples, &mut see_through);
         }
         if !see_through.is_empty() {
-            // In the order of the hits again, as if their rays had been traced one after the other.
-            see_through.sort_by_key(|&(sample, ..)| sample);
             self.attenuate(&see_through, &mut samples, context, work);
         }
         samples
-    }
-
-    /// Traces the shadow rays of a packet and empties it: light that surely does not arrive loses its visibility; what other
-    /// rays pass is added to `see_through`, with the place of the light sample.
-    fn trace_shadows(
-        &self,
-        packet: &mut Packet,
-        samples: &mut [LightSample],
-        see_through: &mut Vec<(usize, Ray, Hit)>,
-    ) {
-        let opaque = |id: MaterialId| self.plan.materials[id.index()].blocks_light();
-        let ways = self.world.blocked_of(&packet.starts, &packet.reaches, opaque);
-        let mut passed = Vec::new();
-        for (lane, &(origin, direction)) in packet.starts.iter().enumerate() {
-            let sample = packet.samples[lane];
-            let is_blocked = match ways[lane] {
-                Way::Clear => continue,
-                Way::Blocked => true,
-                Way::Unsure => {
-                    let ray = Ray::new(origin, direction);
-                    let is_blocked = self.world.blocked(&ray, packet.reaches[lane], opaque, &mut passed);
-                    if !is_blocked {
-                        see_through.extend(passed.iter().map(|hit| (sample, ray, *hit)));
-                    }
-                    is_blocked
-                }
-            };
-            if is_blocked {
-                samples[sample].visibility = 0.0;
-            }
-        }
-        packet.starts.clear();
-        packet.reaches.clear();
-        packet.samples.clear();
     }
 
     /// Lowers the visibility of light samples by what see-through surfaces on the way let pass: asks their shaders for

@@ -43,7 +43,8 @@ impl World {
         hits
     }
 
-    /// Whether something blocks at most [`LANES`] shadow rays within their `reach`. `opaque` is as for [`Self::blocked`].
+    /// Whether something blocks at most [`LANES`] shadow rays within their `reach`. Slower than single rays, which stop at the
+    /// first thing they meet (`tests/bench/README.md`), so the renderer does not use it; the benchmark shows it. `opaque` is as for [`Self::blocked`].
     #[must_use]
     pub fn blocked_of(&self, rays: &[RayStart], reach: &[f32], opaque: impl Fn(MaterialId) -> bool) -> [Way; LANES] {
         let packet = if rays.len() < FEWEST { None } else { LaneRays::of(rays) };
