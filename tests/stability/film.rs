@@ -93,8 +93,16 @@ fn one_pixel() -> f64 {
     let scene = builder.build().unwrap_or_else(|faults| panic!("{faults}"));
     let picture = render_with(&scene, &[Layer::Rgba, Layer::Color], &RenderOptions::default()).0;
     let right = [0.25, 0.5, 0.75, 1.0].into_iter().cycle();
-    picture.channels.iter().flatten().zip(right).filter(|(found, right)| !((**found - right).abs() < 1e-6)).count()
-        as f64
+    picture
+        .channels
+        .iter()
+        .flatten()
+        .zip(right)
+        .filter(|(found, right)| {
+            let off = (**found - right).abs();
+            off.is_nan() || off >= 1e-6
+        })
+        .count() as f64
 }
 
 fn wide_filters() -> f64 {

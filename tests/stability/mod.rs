@@ -69,7 +69,12 @@ fn largest_difference(a: &Picture, b: &Picture) -> f64 {
 fn differing(a: &Picture, b: &Picture, tolerance: f32) -> usize {
     assert_eq!(a.channels.len(), b.channels.len());
     let pairs = a.channels.iter().flatten().zip(b.channels.iter().flatten());
-    pairs.filter(|(a, b)| a.to_bits() != b.to_bits() && !((*a - *b).abs() <= tolerance)).count()
+    pairs
+        .filter(|(a, b)| {
+            let off = (*a - *b).abs();
+            a.to_bits() != b.to_bits() && (off.is_nan() || off > tolerance)
+        })
+        .count()
 }
 
 /// A figure as the table shows it.
