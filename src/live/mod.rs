@@ -1,0 +1,7 @@
+//! Live: a picture that follows its scene and its scripts while they are being edited.
+//!
+//! [`Session`] renders in the background and keeps what an edit does not touch. Everything else here drives it.
+
+pub mod session;
+
+pub use session::{Event, LivePicture, Session, SessionOptions, Setup};
