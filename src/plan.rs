@@ -193,6 +193,13 @@ impl Plan {
         plan
     }
 
+    /// Whether a shader or the overlap test asks how wide a pixel is, so that curved mirrors and glass must be accounted
+    /// for.
+    #[must_use]
+    pub fn follows_cones(&self) -> bool {
+        self.layout.columns.overlap || self.materials.iter().any(|material| material.inputs.intersects(InputSet::CONE))
+    }
+
     /// Whether any ray but those of the camera may be traced along a path.
     #[must_use]
     pub fn has_secondary_rays(&self) -> bool {
@@ -203,6 +210,9 @@ impl Plan {
 /// How a surface's lines look.
 const LINE_OUTPUTS: OutputSet =
     OutputSet::LINE_COLOR.union(OutputSet::LINE_WIDTH).union(OutputSet::LINE_OPACITY).union(OutputSet::PRIORITY);
+
+/// What a shader gives to the line pass alone: colours and rays do not depend on it.
+pub const LINE_SLICE: OutputSet = LINE_OUTPUTS.union(OutputSet::FEATURE);
 
 /// Outputs that mark a hit whose script failed, which no analysis of the script foresees.
 #[must_use]

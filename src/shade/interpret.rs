@@ -33,6 +33,12 @@ impl ShadeErrors {
         self.errors.is_empty()
     }
 
+    /// How many hits had an error.
+    #[must_use]
+    pub fn hits(&self) -> u64 {
+        self.errors.values().map(|(_, hits)| hits).sum()
+    }
+
     /// Adds an error that some hits had.
     pub fn add(&mut self, diagnostic: Diagnostic, hits: u64) {
         let mut key = match &diagnostic.span {

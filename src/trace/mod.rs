@@ -6,6 +6,7 @@
 //! - [`surface`]: from a hit to a place with normals, texture coordinates and error bounds.
 //! - [`wave`]: the rays of a tile, one depth of the ray tree at a time; `shadow` finds what lights give a hit, `scatter`
 //!   shades hits and sends rays on; `list` keeps what the line pass wants to know of surfaces behind the first.
+//! - `record`: what the rays of a tile met, so that it can be shaded again without tracing; `restyle`: only its lines.
 //!
 //! Everything here works relative to the camera's position, so that precision is best where the camera looks from,
 //! wherever in the world that is.
@@ -15,6 +16,8 @@ mod list;
 pub mod mesh_tree;
 pub mod packet;
 mod ray_tree;
+mod record;
+mod restyle;
 mod scatter;
 mod shadow;
 pub mod surface;
@@ -24,7 +27,9 @@ pub mod wave;
 pub mod world;
 mod world_packet;
 
-pub use wave::{RayCounts, TileTracer, TraceContext};
+pub use record::TileRecord;
+pub use restyle::Restyled;
+pub use wave::{Memory, RayCounts, TileTracer, TraceContext, TracedTile};
 pub use world::World;
 pub use world_packet::Way;
 

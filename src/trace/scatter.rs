@@ -33,11 +33,15 @@ impl TileTracer<'_> {
         group: &[WaveHit],
         run: &mut Run,
         context: &mut TraceContext<'_>,
-        work: &mut Work,
+        work: &mut Work<'_>,
     ) {
         let Some(material) = group.first().map(|hit| hit.material) else { return };
         let plan = &self.plan.materials[material.index()];
-        let lights = if plan.lights { self.light_samples(group, context, work) } else { Vec::new() };
+        let lights = if plan.lights {
+            self.light_samples(group, &run.nodes, Some(&mut run.record), context, work)
+        } else {
+            Vec::new()
+        };
         let lights_per_hit = if plan.lights { self.lighting.len() } else { 0 };
 
         let clock = CpuClock::thread();
