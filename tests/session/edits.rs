@@ -20,7 +20,7 @@ const KNOBS: &[Knob] = &[
     ("tint", &["", "tint = false", "compose = \"throughput\""]),
     ("surfaces", &["", "", "", "surfaces = 2"]),
     ("widest", &["", "max_width = 4.0"]),
-    ("lines on", &["", "", "", "", "enabled = false"]),
+    ("paths", &["", "", "", "paths = [\"camera\"]"]),
     ("types", &["", "types.crease = { width = 1.0 }"]),
     (
         "paint script",
@@ -78,12 +78,14 @@ const LAYERS: [&[Layer]; 3] = [
     &[Layer::Color, Layer::Line, Layer::Depth, Layer::Object],
 ];
 
+/// The number of a knob.
+fn knob(name: &str) -> usize {
+    KNOBS.iter().position(|(known, _)| *known == name).unwrap_or_else(|| panic!("no knob `{name}`"))
+}
+
 /// Sources by the place of each knob.
 fn sources(places: &[usize]) -> Sources {
-    let knob = |name: &str| {
-        let index = KNOBS.iter().position(|(known, _)| *known == name).unwrap_or_else(|| panic!("no knob `{name}`"));
-        KNOBS[index].1[places[index]]
-    };
+    let text = |name: &str| KNOBS[knob(name)].1[places[knob(name)]];
     let lines = [
         "normal",
         "feature test",
@@ -93,10 +95,10 @@ fn sources(places: &[usize]) -> Sources {
         "tint",
         "surfaces",
         "widest",
-        "lines on",
+        "paths",
         "types",
     ];
-    let lines: Vec<&str> = lines.map(knob).into_iter().filter(|text| !text.is_empty()).collect();
+    let lines: Vec<&str> = lines.map(text).into_iter().filter(|line| !line.is_empty()).collect();
     let scene = format!(
         "[render]\nsize = [40, 28]\nsamples = {samples}\nbackground = {background}\nambient = {ambient}\n{filter}\n{depth}\n\
          [camera]\nposition = {camera}\ntarget = [0.0, 0.5, 0.0]\nfov = 40.0\n\
@@ -107,29 +109,29 @@ fn sources(places: &[usize]) -> Sources {
          [[objects]]\nname = \"a\"\nshape = \"sphere\"\nradius = 0.6\nmaterial = \"paint\"\ntranslate = {place}\n{object}\n\
          [[objects]]\nname = \"b\"\nshape = \"box\"\nsize = [0.8, 0.8, 0.8]\nmaterial = \"paint\"\ntranslate = [0.7, 0.4, 0.3]\n{other}\n\
          [[lights]]\nkind = \"sun\"\ndirection = {sun}\nstrength = 2.0\nshadows = {shadows}\n{second}\n",
-        samples = knob("samples"),
-        background = knob("background"),
-        ambient = knob("ambient"),
-        filter = knob("filter"),
-        depth = knob("depth"),
-        camera = knob("camera"),
-        width = knob("width"),
+        samples = text("samples"),
+        background = text("background"),
+        ambient = text("ambient"),
+        filter = text("filter"),
+        depth = text("depth"),
+        camera = text("camera"),
+        width = text("width"),
         lines = lines.join("\n"),
-        paint = knob("paint"),
-        ink = knob("ink"),
-        place = knob("place"),
-        object = knob("object"),
-        other = knob("other object"),
-        sun = knob("sun"),
-        shadows = knob("shadows"),
-        second = knob("second light"),
+        paint = text("paint"),
+        ink = text("ink"),
+        place = text("place"),
+        object = text("object"),
+        other = text("other object"),
+        sun = text("sun"),
+        shadows = text("shadows"),
+        second = text("second light"),
     );
     let paint = format!(
         "fn params() {{ #{{ paint: rgb(1.0, 1.0, 1.0), ink: 2.0 }} }}\nfn surface(hit, p) {{ {} }}\n{}\n",
-        knob("paint script"),
-        knob("styled lines")
+        text("paint script"),
+        text("styled lines")
     );
-    let ground = format!("fn surface(hit, p) {{ {} }}\n", knob("ground script"));
+    let ground = format!("fn surface(hit, p) {{ {} }}\n", text("ground script"));
     Sources { scene, scripts: vec![("paint.rhai".into(), paint), ("ground.rhai".into(), ground)] }
 }
 
@@ -210,7 +212,7 @@ fn and_where_little_memory_may_be_used() {
         let session = Session::new(options).unwrap_or_else(|fault| panic!("{fault}"));
         let mut places = vec![0; KNOBS.len()];
         for ink in 0..3 {
-            places[14] = ink;
+            places[knob("ink")] = ink;
             let sources = sources(&places);
             session.set_scene(sources.setup(LAYERS[1]));
             let live = session.render().unwrap_or_else(|faults| panic!("{faults}"));
