@@ -200,6 +200,12 @@ impl Plan {
         self.layout.columns.overlap || self.materials.iter().any(|material| material.inputs.intersects(InputSet::CONE))
     }
 
+    /// Whether light samples are taken anywhere.
+    #[must_use]
+    pub fn takes_light_samples(&self) -> bool {
+        self.materials.iter().any(|material| material.used && (material.lights || material.behind.lights))
+    }
+
     /// Whether any ray but those of the camera may be traced along a path.
     #[must_use]
     pub fn has_secondary_rays(&self) -> bool {

@@ -80,10 +80,11 @@ impl Redo {
             return Self::all();
         }
         let lights = |view: View<'_>| view.scene.lights().to_vec();
-        if lights(old) != lights(new) || old.scene.time() != new.scene.time() {
+        if lights(old) != lights(new) && (old.plan.takes_light_samples() || new.plan.takes_light_samples()) {
             redo.visibility = true;
             redo.shade = true;
         }
+        redo.shade |= old.scene.time() != new.scene.time();
         redo.shade |= !same_shading(old, new);
         redo.lines |= lines_differ(old.plan, new.plan);
         redo.film |= old.plan.filter != new.plan.filter || old.plan.layers != new.plan.layers;

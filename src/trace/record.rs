@@ -99,6 +99,11 @@ impl RunRecord {
                 self.nodes.resize(node + 1, None);
             }
             self.nodes[node] = Some((*ray, hit.copied()));
+            // What an invisible surface before it saw of the lights is another matter.
+            let first = node * self.lights;
+            if let Some(visibility) = self.visibility.get_mut(first..first + self.lights) {
+                visibility.fill(UNKNOWN);
+            }
         }
     }
 

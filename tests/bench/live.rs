@@ -36,7 +36,8 @@ fn main() {
             .iter()
             .filter_map(|text| file::Override::parse(text).ok())
             .collect();
-    let ink = root.join("shaders/ink.rhai");
+    // As the scene file names it.
+    let ink = root.join("scenes/../shaders/ink.rhai");
     let cases = [
         Edit {
             name: "line setting",

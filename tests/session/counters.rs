@@ -4,8 +4,10 @@ use std::sync::Arc;
 
 use tusche::film::Layer;
 use tusche::live::{LivePicture, Session, SessionOptions};
+use tusche::render::RenderOptions;
 
 use super::Sources;
+use crate::common::render_with;
 
 const SCENE: &str = r#"
 [render]
@@ -139,4 +141,15 @@ fn a_moved_object_is_traced() {
     let mut desk = Desk::new();
     let moved = desk.replace("translate = [0.0, 0.5, 0.0]", "translate = [0.2, 0.5, 0.0]");
     assert_eq!(moved.redone.traced, moved.redone.tiles);
+}
+
+/// Found by random edits: what a surface of opacity 0 saw of the lights was taken for what the surface behind it sees.
+#[test]
+fn what_an_invisible_surface_sees_of_the_lights_is_its_own() {
+    let mut desk = Desk::new();
+    desk.replace("base_color: rgb(0.8, 0.2, 0.1) * hit.normal.y", "opacity: 0.0 * hit.uv.x");
+    desk.replace("roughness: 0.0, metallic: 0.5", "color: rgb(0.5, 0.5, 0.5)");
+    let lit = desk.replace("color: rgb(0.5, 0.5, 0.5)", "roughness: 1.0");
+    let (fresh, _) = render_with(&desk.sources.scene(), &[Layer::Rgba], &RenderOptions::default());
+    assert!(lit.channels == fresh.channels, "{:?}", lit.redone);
 }

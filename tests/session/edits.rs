@@ -176,9 +176,10 @@ fn edit_at_random(seed: u64, edits: usize, options: SessionOptions) {
         kept += usize::from(live.redone.traced < live.redone.tiles);
         let (fresh, report) = render_with(&sources.scene(), layers, &RenderOptions::default());
         let last = &history[history.len().saturating_sub(8)..];
+        let off = picture_of(&live).bits().iter().zip(fresh.bits()).filter(|(a, b)| **a != *b).count();
         assert!(
             picture_of(&live).bits() == fresh.bits(),
-            "edit {edit} of seed {seed} gave another picture than a fresh render; {:?}; the last edits were {last:#?}\n{}\n{:?}",
+            "edit {edit} of seed {seed} gave another picture than a fresh render in {off} values; {:?}; the last edits were {last:#?}\n{}\n{:?}",
             live.redone,
             sources.scene,
             sources.scripts
