@@ -27,6 +27,8 @@ pub(super) struct Redo {
     pub restyle: BTreeSet<MaterialId>,
     /// The lines of all tiles are looked for.
     pub lines: bool,
+    /// So that their search needs other bounds.
+    pub bounds: bool,
     /// All tiles are developed.
     pub film: bool,
 }
@@ -42,7 +44,7 @@ pub(super) struct View<'a> {
 impl Redo {
     /// Everything.
     pub fn all() -> Self {
-        Self { trace: true, visibility: true, shade: true, lines: true, film: true, ..Self::default() }
+        Self { trace: true, visibility: true, shade: true, lines: true, bounds: true, film: true, ..Self::default() }
     }
 
     /// Whether there is nothing to do.
@@ -58,6 +60,7 @@ impl Redo {
         self.shade_materials.extend(&other.shade_materials);
         self.restyle.extend(&other.restyle);
         self.lines |= other.lines;
+        self.bounds |= other.bounds;
         self.film |= other.film;
     }
 
@@ -87,6 +90,10 @@ impl Redo {
         redo.shade |= old.scene.time() != new.scene.time();
         redo.shade |= !same_shading(old, new);
         redo.lines |= lines_differ(old.plan, new.plan);
+        redo.bounds |= match (&old.plan.lines, &new.plan.lines) {
+            (Some(a), Some(b)) => !a.rules.same_bounds(&b.rules),
+            (a, b) => a.is_some() != b.is_some(),
+        };
         redo.film |= old.plan.filter != new.plan.filter || old.plan.layers != new.plan.layers;
         for (index, (a, b)) in old.shaders.iter().zip(new.shaders.iter()).enumerate() {
             let id = MaterialId::from_index(index);

@@ -513,7 +513,7 @@ fn bring_up_to_date(
     }
     let clock = CpuClock::thread();
     match (&prepared.plan.lines, &tile.samples) {
-        (Some(lines), Some(samples)) if sampled.changed || redo.lines || tile.bounds.is_none() => {
+        (Some(lines), Some(samples)) if sampled.changed || redo.bounds || tile.bounds.is_none() => {
             tile.bounds = Some(TileBounds::new(samples, &lines.rules));
         }
         (None, _) => tile.bounds = None,

@@ -98,7 +98,6 @@ impl TileTracer<'_> {
         record: &TileRecord,
     ) -> Option<(Run, Vec<WaveHit>)> {
         let nodes = &samples.paths[path];
-        let size = self.scene.render().size;
         let mut run = Run::default();
         let mut group = Vec::with_capacity(rows.len());
         for (index, row) in rows.iter().enumerate() {
@@ -116,7 +115,7 @@ impl TileTracer<'_> {
                 None => {
                     let pixel = samples.pixel_of(sample);
                     let offset = self.positions.offset(pixel, sample % samples.samples_per_pixel);
-                    self.scene.camera().ray(size, pixel, offset)
+                    self.rays.ray(pixel, offset)
                 }
             };
             let ray = WaveRay { origin, direction, node: index as u32, after: None, passed: 0 };

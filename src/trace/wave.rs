@@ -23,6 +23,7 @@ use crate::plan::{Plan, marker};
 use crate::sample::position::SamplePositions;
 use crate::sample::{PairBatch, PixelRect, SampleBuffer, SampleBufferBuilder, SampleColor};
 use crate::scene::Scene;
+use crate::scene::camera::CameraRays;
 use crate::scene::ids::{MaterialId, ObjectId};
 use crate::scene::settings::{Background, RayKinds};
 use crate::shade::batch::{HitBatch, OutputBatch};
@@ -84,6 +85,7 @@ pub struct TileTracer<'a> {
     pub(super) world: &'a World,
     pub(super) lighting: &'a Lighting,
     pub(super) positions: SamplePositions,
+    pub(super) rays: CameraRays,
     /// Whether rays that leave the scene let the page show through.
     pub(super) transparent: bool,
     /// For each object the one that stands for its group; empty if there are no groups.
@@ -146,6 +148,7 @@ impl<'a> TileTracer<'a> {
             world,
             lighting,
             positions: SamplePositions::new(settings.samples, settings.seed),
+            rays: scene.camera().rays(settings.size),
             transparent: settings.background == Background::Transparent,
             stand_ins: scene.stand_ins(),
             cone: Cone { width, spread: angle },
@@ -207,7 +210,6 @@ impl<'a> TileTracer<'a> {
 
     /// Makes the camera rays of a run of pixels the next wave; returns where in their pixels they start.
     fn start(&self, rect: PixelRect, pixels: Range<usize>, run: &mut Run) -> Vec<[f32; 2]> {
-        let size = self.scene.render().size;
         let per_pixel = self.plan.layout.samples_per_pixel;
         let count = pixels.len() * per_pixel as usize;
         let mut offsets = Vec::with_capacity(count);
@@ -216,7 +218,7 @@ impl<'a> TileTracer<'a> {
             let pixel = [rect.x0 + (index % width) as i32, rect.y0 + (index / width) as i32];
             for sample in 0..per_pixel {
                 let offset = self.positions.offset(pixel, sample);
-                let (origin, direction) = self.scene.camera().ray(size, pixel, offset);
+                let (origin, direction) = self.rays.ray(pixel, offset);
                 let node = run.nodes.len() as u32;
                 run.next.push(WaveRay { origin, direction, node, after: None, passed: 0 });
                 run.nodes.push(TreeNode::root(index as u32 * per_pixel + sample, self.cone));

@@ -61,19 +61,19 @@ fn main() {
             name: "BSDF colour",
             file: scene.clone(),
             old: "paper = [0.70, 0.17, 0.12]",
-            new: |n| format!("paper = [0.{}, 0.17, 0.12]", 10 + n),
+            new: |n| format!("paper = [0.{:03}, 0.17, 0.12]", 100 + n),
         },
         Edit {
             name: "moved light",
             file: scene.clone(),
             old: "direction = [-0.5, -0.8, -0.4]",
-            new: |n| format!("direction = [-0.5, -0.8, -0.{}]", 10 + n),
+            new: |n| format!("direction = [-0.5, -0.8, -0.{:03}]", 100 + n),
         },
         Edit {
             name: "moved object",
             file: scene.clone(),
             old: "translate = [0, 1.2, 0]",
-            new: |n| format!("translate = [0, 1.{}, 0]", 10 + n),
+            new: |n| format!("translate = [0, 1.{:03}, 0]", 100 + n),
         },
     ];
     println!(
