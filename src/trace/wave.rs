@@ -11,6 +11,7 @@ use std::ops::Range;
 use smallvec::SmallVec;
 
 use super::cone::Cone;
+use super::media::Seen;
 use super::packet::{LANES, RayStart};
 use super::ray_tree::{Run, TreeNode, WaveHit, WaveRay};
 use super::surface::Surface;
@@ -185,6 +186,9 @@ impl<'a> TileTracer<'a> {
         let mut run = std::mem::take(&mut context.run);
         run.clear();
         let offsets = self.start(rect, pixels, &mut run);
+        if !self.plan.bodies.is_empty() {
+            self.start_in_media(&mut run, context, work);
+        }
         while !run.next.is_empty() {
             let wave = std::mem::take(&mut run.next);
             self.run_wave(wave, &mut run, context, work);
@@ -208,7 +212,7 @@ impl<'a> TileTracer<'a> {
                 let offset = self.positions.offset(pixel, sample);
                 let (origin, direction) = self.scene.camera().ray(size, pixel, offset);
                 let node = run.nodes.len() as u32;
-                run.next.push(WaveRay { origin, direction, node, after: None, passed: 0 });
+                run.next.push(WaveRay { origin, direction, node, after: None, passed: 0, media: 0, counted: 0 });
                 run.nodes.push(TreeNode::root(index as u32 * per_pixel + sample, self.cone));
                 offsets.push(offset);
             }
@@ -245,29 +249,48 @@ impl<'a> TileTracer<'a> {
             if index % LANES == 0 {
                 packet = self.packet_hits(&wave[index..(index + LANES).min(wave.len())], run);
             }
-            let Run { nodes, behind, .. } = run;
+            let Run { nodes, behind, media, crossings, .. } = run;
             let node = &mut nodes[wave_ray.node as usize];
-            let kind = work.count(node.kind);
             let ray = Ray::new(wave_ray.origin, wave_ray.direction);
-            let found = if let Some(found) = packet[index % LANES] {
-                found
-            } else if wave_ray.passed >= MOST_INVISIBLE {
-                None
-            } else if self.keeps_list(node.path) {
-                self.surface_list(&ray, kind, wave_ray, &[], &mut list);
-                let hits = list.iter().enumerate().skip(1);
-                behind.extend(hits.map(|(place, hit)| self.wave_hit(wave_ray, &ray, hit, node, place)));
-                list.first().copied()
-            } else {
-                self.world.next_hit(&ray, kind, f32::INFINITY, wave_ray.after)
-            };
-            match found {
-                Some(hit) => hits.push(self.wave_hit(wave_ray, &ray, &hit, node, 0)),
-                None => {
-                    node.radiance = self.lighting.background(wave_ray.direction);
-                    node.alpha = if self.transparent { 0.0 } else { 1.0 };
+            let mut from = *wave_ray;
+            let mut packet = packet[index % LANES];
+            let seen = loop {
+                let kind = work.count(node.kind);
+                list.clear();
+                let found = if let Some(found) = packet.take() {
+                    found
+                } else if from.passed >= MOST_INVISIBLE {
+                    None
+                } else if self.keeps_list(node.path) {
+                    self.surface_list(&ray, kind, &from, &[], &mut list);
+                    list.first().copied()
+                } else {
+                    self.world.next_hit(&ray, kind, from.after.as_ref())
+                };
+                let Some(found) = found else { break None };
+                if self.plan.bodies.is_empty() {
+                    break Some(Seen { hit: found, error: Vec3::ZERO, crossing: None });
                 }
+                if let Some(seen) = self.cross(&ray, kind, &mut from, &found, media) {
+                    break Some(seen);
+                }
+            };
+            let Some(Seen { hit, error, crossing }) = seen else {
+                node.radiance = self.lighting.background(from.direction);
+                node.alpha = if self.transparent { 0.0 } else { 1.0 };
+                continue;
+            };
+            // What else is at the place of a crossing is seen through it.
+            let is_behind = |other: &&Hit| other.facet() != hit.facet() && (crossing.is_none() || other.t > hit.t);
+            let behind_it = list.iter().filter(is_behind).zip(1..);
+            behind.extend(behind_it.map(|(hit, place)| self.wave_hit(&from, &ray, hit, node, place)));
+            let mut hit = self.wave_hit(&from, &ray, &hit, node, 0);
+            hit.surface.error = hit.surface.error.max(error);
+            if let Some(crossing) = crossing {
+                hit.crossing = Some(crossings.len() as u32);
+                crossings.push(crossing);
             }
+            hits.push(hit);
         }
         hits
     }
@@ -296,6 +319,7 @@ impl<'a> TileTracer<'a> {
             material: self.world.material(hit),
             depth: node.length_before + hit.t,
             place: place as u32,
+            crossing: None,
         }
     }
 
