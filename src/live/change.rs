@@ -17,6 +17,8 @@ use crate::shade::{InputSet, Mode, OutputSet, Shader, Shaders};
 pub(super) struct Redo {
     /// Rays meet other things: all is traced.
     pub trace: bool,
+    /// Which of several surfaces at one place comes first may have changed.
+    pub ties: bool,
     /// What hits see of lights has changed.
     pub visibility: bool,
     /// Everything is shaded, with rays that are known.
@@ -55,6 +57,7 @@ impl Redo {
     /// Adds what another asks for.
     pub fn add(&mut self, other: &Self) {
         self.trace |= other.trace;
+        self.ties |= other.ties;
         self.visibility |= other.visibility;
         self.shade |= other.shade;
         self.shade_materials.extend(&other.shade_materials);
@@ -77,10 +80,16 @@ impl Redo {
             && old.scene.camera() == new.scene.camera()
             && same_sampling(old.scene, new.scene)
             && old.plan.surfaces == new.plan.surfaces
+            && old.plan.bodies == new.plan.bodies
             // Which surfaces a list keeps depends on the tests.
             && (new.plan.surfaces == 1 || same_tests(old, new));
         if !same_rays {
             return Self::all();
+        }
+        if !same_ties(old.scene, new.scene) {
+            redo.ties = true;
+            redo.visibility = true;
+            redo.shade = true;
         }
         let lights = |view: View<'_>| view.scene.lights().to_vec();
         if lights(old) != lights(new) && (old.plan.takes_light_samples() || new.plan.takes_light_samples()) {
@@ -106,7 +115,9 @@ impl Redo {
 impl View<'_> {
     /// Whether the hierarchies are those of another view.
     pub fn same_world(self, other: View<'_>) -> bool {
-        same_world(other, self) && self.scene.camera().position == other.scene.camera().position
+        same_world(other, self)
+            && same_ties(other.scene, self.scene)
+            && self.scene.camera().position == other.scene.camera().position
     }
 }
 
@@ -130,6 +141,15 @@ fn same_world(old: View<'_>, new: View<'_>) -> bool {
             let (a, b) = (meshes(old.scene), meshes(new.scene));
             a.len() == b.len() && a.iter().zip(&b).all(|(a, b)| std::sync::Arc::ptr_eq(a, b) || a == b)
         }
+}
+
+/// Whether of several surfaces at one place the same come first.
+fn same_ties(old: &Scene, new: &Scene) -> bool {
+    let of_objects = |scene: &Scene| -> Vec<_> { scene.objects().iter().map(|object| object.priority).collect() };
+    let of_materials = |scene: &Scene| -> Vec<_> {
+        scene.materials().iter().map(|material| (material.priority, material.dielectric_priority)).collect()
+    };
+    of_objects(old) == of_objects(new) && of_materials(old) == of_materials(new)
 }
 
 /// Whether the camera's rays start alike.

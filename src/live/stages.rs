@@ -492,6 +492,9 @@ fn bring_up_to_date(
             if redo.visibility {
                 record.forget_visibility();
             }
+            if redo.ties {
+                record.forget_ties();
+            }
             record
         });
         contexts.with(|context| {

@@ -54,6 +54,10 @@ impl TileTracer<'_> {
         let constant = plan.mode == Mode::Constant;
         let inputs = if constant { InputSet::empty() } else { shaders.of(material).needs(wanted) };
         let lit = plan.lights && inputs.intersects(InputSet::LIGHTS);
+        if lit && !self.plan.bodies.is_empty() {
+            // Shadow rays start farther from where bodies touch.
+            return None;
+        }
         let errors = context.errors.hits();
         let mut work = Work { known: Some(record), ..Work::new(self.scene.materials().len()) };
         let mut restyled = Restyled::default();
@@ -118,7 +122,7 @@ impl TileTracer<'_> {
                     self.rays.ray(pixel, offset)
                 }
             };
-            let ray = WaveRay { origin, direction, node: index as u32, after: None, passed: 0 };
+            let ray = WaveRay { origin, direction, node: index as u32, after: None, passed: 0, media: 0, counted: 0 };
             group.push(self.wave_hit(&ray, &Ray::new(origin, direction), &hit, &node, 0));
             run.nodes.push(node);
         }

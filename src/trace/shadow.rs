@@ -85,11 +85,13 @@ impl TileTracer<'_> {
         let mut hits: Vec<(usize, WaveHit)> = passed
             .iter()
             .map(|(sample, ray, hit)| {
-                let wave_ray =
-                    WaveRay { origin: ray.origin, direction: ray.direction, node: 0, after: None, passed: 0 };
+                let (origin, direction) = (ray.origin, ray.direction);
+                let wave_ray = WaveRay { origin, direction, node: 0, after: None, passed: 0, media: 0, counted: 0 };
                 let surface = Surface::new(self.world, ray, hit);
                 let material = self.world.material(hit);
-                (*sample, WaveHit { ray: wave_ray, hit: *hit, surface, material, depth: hit.t, place: 0 })
+                let hit =
+                    WaveHit { ray: wave_ray, hit: *hit, surface, material, depth: hit.t, place: 0, crossing: None };
+                (*sample, hit)
             })
             .collect();
         hits.sort_by_key(|(_, hit)| hit.material);
@@ -130,7 +132,7 @@ impl TileTracer<'_> {
         // In the order along each ray again: products round differently in other orders.
         let mut order: Vec<usize> = (0..hits.len()).collect();
         order.sort_by(|&a, &b| {
-            let key = |i: usize| (hits[i].0, hits[i].1.hit.rank());
+            let key = |i: usize| (hits[i].0, hits[i].1.hit.t, hits[i].1.hit.facet());
             key(a).partial_cmp(&key(b)).unwrap_or(std::cmp::Ordering::Equal)
         });
         for index in order {

@@ -11,6 +11,7 @@ use std::ops::Range;
 use smallvec::SmallVec;
 
 use super::cone::Cone;
+use super::media::Seen;
 use super::packet::{LANES, RayStart};
 use super::ray_tree::{Run, TreeNode, WaveHit, WaveRay};
 use super::record::TileRecord;
@@ -195,6 +196,9 @@ impl<'a> TileTracer<'a> {
         run.clear();
         run.record.clear(record.is_some(), self.lighting.len());
         let offsets = self.start(rect, pixels, &mut run);
+        if !self.plan.bodies.is_empty() {
+            self.start_in_media(&mut run, context, work);
+        }
         while !run.next.is_empty() {
             let wave = std::mem::take(&mut run.next);
             self.run_wave(wave, &mut run, context, work);
@@ -220,7 +224,7 @@ impl<'a> TileTracer<'a> {
                 let offset = self.positions.offset(pixel, sample);
                 let (origin, direction) = self.rays.ray(pixel, offset);
                 let node = run.nodes.len() as u32;
-                run.next.push(WaveRay { origin, direction, node, after: None, passed: 0 });
+                run.next.push(WaveRay { origin, direction, node, after: None, passed: 0, media: 0, counted: 0 });
                 run.nodes.push(TreeNode::root(index as u32 * per_pixel + sample, self.cone));
                 offsets.push(offset);
             }
@@ -258,33 +262,58 @@ impl<'a> TileTracer<'a> {
                 let rays = &wave[index..(index + LANES).min(wave.len())];
                 packet = if work.known.is_some() { [None; LANES] } else { self.packet_hits(rays, run) };
             }
-            let Run { nodes, behind, record, .. } = run;
+            let Run { nodes, behind, media, crossings, record, .. } = run;
             let node = &mut nodes[wave_ray.node as usize];
             let ray = Ray::new(wave_ray.origin, wave_ray.direction);
-            let known = work.known.filter(|_| !self.keeps_list(node.path)).and_then(|known| known.met(node, wave_ray));
-            let kind = if known.is_some() { RayKinds::empty() } else { work.count(node.kind) };
-            let found = if let Some(found) = known.or(packet[index % LANES]) {
-                found
-            } else if wave_ray.passed >= MOST_INVISIBLE {
-                None
-            } else if self.keeps_list(node.path) {
-                self.surface_list(&ray, kind, wave_ray, &[], &mut list);
-                let hits = list.iter().enumerate().skip(1);
-                behind.extend(hits.map(|(place, hit)| self.wave_hit(wave_ray, &ray, hit, node, place)));
-                list.first().copied()
-            } else {
-                self.world.next_hit(&ray, kind, f32::INFINITY, wave_ray.after)
-            };
-            record.note(wave_ray, found.as_ref());
-            match found {
-                Some(hit) => hits.push(self.wave_hit(wave_ray, &ray, &hit, node, 0)),
-                None => {
-                    node.radiance = self.lighting.background(wave_ray.direction);
-                    node.alpha = if self.transparent { 0.0 } else { 1.0 };
+            let mut from = *wave_ray;
+            let known = self.known_hit(work, node, wave_ray);
+            let mut at_once = known.or(packet[index % LANES]);
+            let seen = loop {
+                let kind = if known.is_some() { RayKinds::empty() } else { work.count(node.kind) };
+                list.clear();
+                let found = if let Some(found) = at_once.take() {
+                    found
+                } else if from.passed >= MOST_INVISIBLE {
+                    None
+                } else if self.keeps_list(node.path) {
+                    self.surface_list(&ray, kind, &from, &[], &mut list);
+                    list.first().copied()
+                } else {
+                    self.world.next_hit(&ray, kind, from.after.as_ref())
+                };
+                let Some(found) = found else { break None };
+                if self.plan.bodies.is_empty() {
+                    break Some(Seen { hit: found, error: Vec3::ZERO, crossing: None });
                 }
+                if let Some(seen) = self.cross(&ray, kind, &mut from, &found, media) {
+                    break Some(seen);
+                }
+            };
+            record.note(&from, seen.as_ref().map(|seen| &seen.hit));
+            let Some(Seen { hit, error, crossing }) = seen else {
+                node.radiance = self.lighting.background(from.direction);
+                node.alpha = if self.transparent { 0.0 } else { 1.0 };
+                continue;
+            };
+            // What else is at the place of a crossing is seen through it.
+            let is_behind = |other: &&Hit| other.facet() != hit.facet() && (crossing.is_none() || other.t > hit.t);
+            let behind_it = list.iter().filter(is_behind).zip(1..);
+            behind.extend(behind_it.map(|(hit, place)| self.wave_hit(&from, &ray, hit, node, place)));
+            let mut hit = self.wave_hit(&from, &ray, &hit, node, 0);
+            hit.surface.error = hit.surface.error.max(error);
+            if let Some(crossing) = crossing {
+                hit.crossing = Some(crossings.len() as u32);
+                crossings.push(crossing);
             }
+            hits.push(hit);
         }
         hits
+    }
+
+    /// What a ray meets, if a record tells. Lists want more than that, and what is seen of bodies depends on their shaders.
+    fn known_hit(&self, work: &Work<'_>, node: &TreeNode, ray: &WaveRay) -> Option<Option<Hit>> {
+        let known = work.known.filter(|_| self.plan.bodies.is_empty() && !self.keeps_list(node.path))?;
+        known.met(node, ray)
     }
 
     /// What camera rays meet that start together; `None` for rays that are to be traced one by one: those of mirrors and glass
@@ -311,6 +340,7 @@ impl<'a> TileTracer<'a> {
             material: self.world.material(hit),
             depth: node.length_before + hit.t,
             place: place as u32,
+            crossing: None,
         }
     }
 

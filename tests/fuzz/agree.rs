@@ -187,6 +187,7 @@ pub fn scene(script: &str) -> Scene {
         script: script_id,
         params,
         priority: None,
+        dielectric_priority: 0,
         double_sided: true,
         lines: Default::default(),
         span: None,

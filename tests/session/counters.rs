@@ -165,7 +165,10 @@ fn a_script_is_replaced_by_name_and_a_faulty_one_is_not() {
     let picture = desk.session.render().unwrap_or_else(|faults| panic!("{faults}"));
     assert_eq!((picture.generation, picture.redone.traced), (2, 0));
     assert_eq!(picture.redone.materials, ["paint"]);
-    let fault = desk.session.set_shader("paint.rhai", "fn params() { #{ ink: 1.0 } } fn surface(hit, p) { #{ line_widht: 1.0 } }").unwrap_err();
+    let fault = desk
+        .session
+        .set_shader("paint.rhai", "fn params() { #{ ink: 1.0 } } fn surface(hit, p) { #{ line_widht: 1.0 } }")
+        .unwrap_err();
     assert!(fault.to_string().contains("line_width"), "{fault}");
     let fault = desk.session.set_shader("pain.rhai", PAINT).unwrap_err();
     assert!(fault.to_string().contains("ground.rhai"), "{fault}");
