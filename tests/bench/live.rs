@@ -118,11 +118,11 @@ fn main() {
             let first: Option<std::sync::Arc<LivePicture>> = events.try_iter().find_map(shown);
             firsts.push(first.map_or(0.0, |picture| picture.stats.seconds.total) + loads[n]);
             if !arguments.iter().any(|argument| argument == "--fresh-once") || n == 0 {
-            let start = Instant::now();
-            let other = session(false);
-            other.set_scene(load(n));
-            let _ = other.render();
-            fresh.push(start.elapsed().as_secs_f64());
+                let start = Instant::now();
+                let other = session(false);
+                other.set_scene(load(n));
+                let _ = other.render();
+                fresh.push(start.elapsed().as_secs_f64());
             }
         }
         let [time, first, load, fresh] = [times, firsts, loads, fresh].map(median);
