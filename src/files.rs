@@ -12,6 +12,8 @@ use crate::diag::{Diagnostic, Source};
 pub struct FileStore {
     cache: Mutex<BTreeMap<PathBuf, Arc<[u8]>>>,
     missing: Mutex<Vec<PathBuf>>,
+    /// What an earlier store read, and need not be read again; no dependencies until somebody asks for them.
+    known: BTreeMap<PathBuf, Arc<[u8]>>,
 }
 
 impl FileStore {
@@ -28,12 +30,25 @@ impl FileStore {
         self
     }
 
+    /// A new store without dependencies that takes over what this one read, except the files named here: whoever
+    /// follows files knows which of them are still the same.
+    #[must_use]
+    pub fn succeeded(&self, changed: &[PathBuf]) -> Self {
+        let mut known = lock(&self.cache).clone();
+        changed.iter().for_each(|path| drop(known.remove(path)));
+        Self { known, ..Self::default() }
+    }
+
     /// The bytes of a file.
     ///
     /// # Errors
     /// A diagnostic with the path and the system's reason; the caller adds the place that asked for the file.
     pub fn read(&self, path: &Path) -> Result<Arc<[u8]>, Diagnostic> {
         if let Some(bytes) = lock(&self.cache).get(path) {
+            return Ok(Arc::clone(bytes));
+        }
+        if let Some(bytes) = self.known.get(path) {
+            lock(&self.cache).insert(path.to_owned(), Arc::clone(bytes));
             return Ok(Arc::clone(bytes));
         }
         let bytes = std::fs::read(path).map_err(|error| {
@@ -61,6 +76,12 @@ impl FileStore {
                 .in_file(path)
         })?;
         Ok(Source::new(path.display().to_string(), text))
+    }
+
+    /// The bytes of a file, if it was read.
+    #[must_use]
+    pub fn held(&self, path: &Path) -> Option<Arc<[u8]>> {
+        lock(&self.cache).get(path).map(Arc::clone)
     }
 
     /// Every file that was read, and every file that was looked for and not found, sorted.

@@ -7,11 +7,13 @@
 
 mod files;
 mod grid;
+pub mod request;
 mod scripts;
 pub mod stats;
 pub mod why;
 
-pub use files::{PictureFile, layers_of, render_files};
+pub use files::{PictureFile, layers_of, render_files, write_picture};
+pub use request::{LoadedScene, SceneRequest};
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
