@@ -97,10 +97,13 @@ const RENDER: [&str; 4] = ["samples", "ambient", "filter", "filter_radius"];
 #[must_use]
 pub fn controls(written: &Json, scene: &Scene, shaders: &Shaders, edits: &Edits) -> Vec<ControlGroup> {
     let mut groups = Vec::new();
-    let about = |definition: &str| first_sentence(SCHEMA["$defs"][definition]["description"].as_str().unwrap_or(""));
     let mut lines = Vec::new();
     of_object(&SCHEMA["$defs"]["Lines"], &["lines".into()], written, edits, &mut lines);
-    groups.push(ControlGroup { title: "lines".into(), about: about("Lines"), controls: lines });
+    groups.push(ControlGroup {
+        title: "lines".into(),
+        about: "where scripts do not say otherwise".into(),
+        controls: lines,
+    });
     // A material of a model stands in no scene file, so there is no place for its values.
     let has_place = |name: &str| written["materials"].get(name).is_some();
     for (material, shader) in scene.materials().iter().zip(shaders.iter()).filter(|(m, _)| has_place(&m.name)) {
@@ -112,7 +115,7 @@ pub fn controls(written: &Json, scene: &Scene, shaders: &Shaders, edits: &Edits)
     let mut render = Vec::new();
     of_object(&SCHEMA["$defs"]["Render"], &["render".into()], written, edits, &mut render);
     render.retain(|control| RENDER.contains(&control.path[1].as_str()));
-    groups.push(ControlGroup { title: "render".into(), about: about("Render"), controls: render });
+    groups.push(ControlGroup { title: "render".into(), about: "sampling and filter".into(), controls: render });
     groups
 }
 
@@ -312,10 +315,6 @@ fn json_of(value: &Value) -> Json {
 /// A float with as many digits as it needs, which its nearest double has not.
 fn short(value: f32) -> Json {
     value.to_string().parse::<f64>().map_or(Json::Null, |value| json!(value))
-}
-
-fn first_sentence(text: &str) -> String {
-    text.split(". ").next().unwrap_or("").trim_end_matches('.').to_owned()
 }
 
 #[cfg(test)]
