@@ -94,7 +94,7 @@ impl Edits {
         })?;
         let mut faults = Diagnostics::default();
         for (path, value) in &self.list {
-            if let Err(fault) = write(document.as_table_mut(), path, value) {
+            if let Err(fault) = write(document.as_table_mut(), false, path, value) {
                 faults.push(fault);
             }
         }
@@ -130,13 +130,23 @@ fn from_json(value: &serde_json::Value) -> Result<Value, Diagnostic> {
     })
 }
 
-/// Puts a value at a path below a table.
-fn write(table: &mut dyn TableLike, path: &[String], value: &Value) -> Result<(), Diagnostic> {
+/// Puts a value at a path below a table, which may stand in braces.
+fn write(table: &mut dyn TableLike, in_braces: bool, path: &[String], value: &Value) -> Result<(), Diagnostic> {
     let Some((first, rest)) = path.split_first() else { return Ok(()) };
     if rest.is_empty() {
         match table.get_mut(first).and_then(Item::as_value_mut) {
             Some(old) => replace(old, value.clone()),
-            None => drop(table.insert(first, Item::Value(value.clone()))),
+            None => {
+                let mut value = value.clone();
+                if in_braces && let Some(last) = table.iter_mut().filter_map(|(_, item)| item.as_value_mut()).last() {
+                    // The space before the brace belongs to what comes last.
+                    let suffix = last.decor().suffix().cloned().unwrap_or_default();
+                    last.decor_mut().set_suffix("");
+                    value.decor_mut().set_prefix(" ");
+                    value.decor_mut().set_suffix(suffix);
+                }
+                table.insert(first, Item::Value(value));
+            }
         }
         return Ok(());
     }
@@ -162,7 +172,7 @@ fn write_below(item: &mut Item, name: &str, path: &[String], value: &Value) -> R
         let names: Vec<_> = tables.iter().map(named).collect();
         let index = place_of(&names, name, &path[0])?;
         let table = tables.get_mut(index).ok_or_else(|| no_place(&path[0]))?;
-        return write(table, &path[1..], value);
+        return write(table, false, &path[1..], value);
     }
     if let Item::Value(Value::Array(items)) = item {
         let named = |item: &Value| item.as_inline_table()?.get("name")?.as_str().map(str::to_owned);
@@ -174,12 +184,13 @@ fn write_below(item: &mut Item, name: &str, path: &[String], value: &Value) -> R
                 replace(element, value.clone());
                 Ok(())
             }
-            (rest, Value::InlineTable(table)) => write(table, rest, value),
+            (rest, Value::InlineTable(table)) => write(table, true, rest, value),
             (rest, _) => Err(no_place(&rest[0])),
         };
     }
+    let in_braces = item.is_inline_table();
     let table = item.as_table_like_mut().ok_or_else(|| no_place(&path[0]))?;
-    write(table, path, value)
+    write(table, in_braces, path, value)
 }
 
 /// The index of an element that goes by number or by name.

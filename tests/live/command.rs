@@ -124,7 +124,7 @@ fn reloads_leave_nothing_behind() {
     let scene = place.folder.path().join("scene.toml");
     let mut counts = Vec::new();
     for round in 0..60_u16 {
-        replace(&scene, with_background(0.2 + 0.01 * f32::from(round)));
+        replace(&scene, with_background(0.3 + 0.01 * f32::from(round)));
         running.says("picture of");
         place.file("ink.rhai", "fn surface(");
         running.says("ink.rhai:1:");
@@ -146,7 +146,7 @@ fn flags_that_do_not_fit_are_refused() {
     for (arguments, text) in [
         (&["--lines", "brute"][..], "--lines exact"),
         (&["--display", "screen"], "write `tev`"),
-        (&["--cache", "much"], "is not a whole number"),
+        (&["--cache", "much"], "write a number of bytes"),
         (&["--no-page", "--port", "1"], "cannot be used with"),
         (&["-o", "a.png", "-o", "./a.png"], "given twice"),
         (&["--host", "localhost"], "invalid"),

@@ -139,7 +139,8 @@ fn a_texture_that_is_replaced() {
     place.file("scene.toml", SCENE.replace("params = { paper = [0.8, 0.7, 0.5] }", params));
     place.file("paper.png", png(51));
     let watching = Watching::start(options(&place));
-    assert!(is_near(paper(&watching.picture()), 0.2));
+    let first = paper(&watching.picture());
+    assert!(is_near(first, 0.2), "{first}");
     replace(&place.folder.path().join("paper.png"), png(204));
     watching.picture_with("picture of the new texture", |picture| is_near(paper(picture), 0.8));
 }
