@@ -133,7 +133,7 @@ fn a_texture_that_is_replaced() {
     let place = place();
     place.file(
         "ink.rhai",
-        "fn params() { #{ paper: () } }\nfn surface(hit, p) { #{ color: texture(p.paper, hit.uv) } }",
+        "fn params() { #{ paper: () } }\nfn surface(hit, p) { #{ color: texture(p.paper, hit.uv).rgb } }",
     );
     let params = "params = { paper = { file = \"paper.png\", color = \"linear\" } }";
     place.file("scene.toml", SCENE.replace("params = { paper = [0.8, 0.7, 0.5] }", params));
