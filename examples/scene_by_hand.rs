@@ -47,6 +47,7 @@ fn main() -> Result<(), Diagnostics> {
         script,
         params: Default::default(),
         priority: None,
+        dielectric_priority: 0,
         double_sided: true,
         lines: Default::default(),
         span: None,

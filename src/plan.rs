@@ -7,9 +7,9 @@ use std::fmt;
 use crate::film::{Filter, Layer};
 use crate::line::{LineScript, Rules};
 use crate::sample::{NodeColumnSet, SampleLayout};
-use crate::scene::Scene;
 use crate::scene::ids::MaterialId;
 use crate::scene::settings::{Background, FilterKind, LineOverrides, LineSettings, LineType, RayKinds};
+use crate::scene::{Object, Scene};
 use crate::shade::analysis::OutputFact;
 use crate::shade::bsdf::MIRROR_ROUGHNESS;
 use crate::shade::{InputSet, Mode, OutputSet, PairSet, Shader, Shaders};
@@ -84,6 +84,8 @@ pub struct Plan {
     pub reflection_depth: u32,
     /// Most refractions along a path; 0 if nothing is transparent.
     pub refraction_depth: u32,
+    /// By object, whether it is a body that rays can be inside of; empty if there is none.
+    pub bodies: Vec<bool>,
     /// Whether shadow rays are traced.
     pub shadow_rays: bool,
     /// The line pass; `None` if no line can be seen.
@@ -176,11 +178,13 @@ impl Plan {
         };
         let shadow_rays = materials.iter().any(|m| m.used && (m.lights || m.behind.lights))
             && scene.lights().iter().any(|l| l.shadows);
+        let bodies = if refraction_depth > 0 { bodies(scene, &materials) } else { Vec::new() };
         let mut plan = Self {
             materials,
             color,
             reflection_depth,
             refraction_depth,
+            bodies,
             shadow_rays,
             lines,
             surfaces,
@@ -193,6 +197,19 @@ impl Plan {
         plan
     }
 
+    /// Whether a shader or the overlap test asks how wide a pixel is, so that curved mirrors and glass must be accounted
+    /// for.
+    #[must_use]
+    pub fn follows_cones(&self) -> bool {
+        self.layout.columns.overlap || self.materials.iter().any(|material| material.inputs.intersects(InputSet::CONE))
+    }
+
+    /// Whether light samples are taken anywhere.
+    #[must_use]
+    pub fn takes_light_samples(&self) -> bool {
+        self.materials.iter().any(|material| material.used && (material.lights || material.behind.lights))
+    }
+
     /// Whether any ray but those of the camera may be traced along a path.
     #[must_use]
     pub fn has_secondary_rays(&self) -> bool {
@@ -203,6 +220,9 @@ impl Plan {
 /// How a surface's lines look.
 const LINE_OUTPUTS: OutputSet =
     OutputSet::LINE_COLOR.union(OutputSet::LINE_WIDTH).union(OutputSet::LINE_OPACITY).union(OutputSet::PRIORITY);
+
+/// What a shader gives to the line pass alone: colours and rays do not depend on it.
+pub const LINE_SLICE: OutputSet = LINE_OUTPUTS.union(OutputSet::FEATURE);
 
 /// Outputs that mark a hit whose script failed, which no analysis of the script foresees.
 #[must_use]
@@ -220,6 +240,26 @@ fn used_materials(scene: &Scene) -> Vec<bool> {
         }
     }
     used
+}
+
+/// Which objects are bodies that rays can be inside of. An object that some rays do not see is none: they would enter it and
+/// never leave.
+fn bodies(scene: &Scene, materials: &[MaterialPlan]) -> Vec<bool> {
+    let seen = RayKinds::CAMERA | RayKinds::REFLECTION | RayKinds::REFRACTION;
+    // By mesh; most scenes use few of glass, but those often.
+    let mut closed = vec![None; scene.meshes().len()];
+    let mut is_body = |object: &Object| {
+        let mesh = object.mesh.index();
+        refracts(object, materials)
+            && object.visible_to.contains(seen)
+            && *closed[mesh].get_or_insert_with(|| scene.meshes()[mesh].is_closed())
+    };
+    let bodies: Vec<bool> = scene.objects().iter().map(&mut is_body).collect();
+    if bodies.contains(&true) { bodies } else { Vec::new() }
+}
+
+fn refracts(object: &Object, materials: &[MaterialPlan]) -> bool {
+    object.materials.iter().any(|id| materials[id.index()].refracts)
 }
 
 /// Least and greatest value an output can have, with its default where the script may leave it out; `None` if unknown.
@@ -406,6 +446,9 @@ fn explain(plan: &Plan, scene: &Scene, shaders: &Shaders) -> String {
             depth => format!("to depth {depth}: {}", names(|m| m.refracts || m.see_through)),
         },
     );
+    if plan.refraction_depth > 0 && plan.materials.iter().any(|material| material.used && material.refracts) {
+        row("media", explain_media(plan, scene));
+    }
     row(
         "shadow rays",
         if plan.shadow_rays {
@@ -477,6 +520,28 @@ fn explain(plan: &Plan, scene: &Scene, shaders: &Shaders) -> String {
         );
     }
     text
+}
+
+/// What rays can be inside of.
+fn explain_media(plan: &Plan, scene: &Scene) -> String {
+    let (mut bodies, mut sheets) = (Vec::new(), Vec::new());
+    for (index, object) in scene.objects().iter().enumerate().filter(|(_, object)| refracts(object, &plan.materials)) {
+        if !plan.bodies.get(index).is_some_and(|body| *body) {
+            sheets.push(object.name.as_str());
+            continue;
+        }
+        let priority = object.materials.iter().map(|id| scene.materials()[id.index()].dielectric_priority).max();
+        bodies.push(match priority {
+            None | Some(0) => object.name.clone(),
+            Some(priority) => format!("{} (dielectric priority {priority})", object.name),
+        });
+    }
+    let bodies: Vec<_> = bodies.iter().map(String::as_str).collect();
+    let mut parts = vec![if bodies.is_empty() { "no bodies".into() } else { shorten(&bodies) }];
+    if !sheets.is_empty() {
+        parts.push(format!("not closed or not seen by all rays, so nothing is inside of them: {}", shorten(&sheets)));
+    }
+    parts.join("; ")
 }
 
 fn tests_of(settings: &LineSettings) -> Vec<String> {

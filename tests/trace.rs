@@ -26,6 +26,7 @@ pub fn builder() -> SceneBuilder {
         script,
         params: Default::default(),
         priority: None,
+        dielectric_priority: 0,
         double_sided: true,
         lines: Default::default(),
         span: None,
@@ -197,11 +198,11 @@ fn of_surfaces_at_one_depth_the_lowest_object_and_triangle_counts() {
 /// The hits of a ray one after the other, at most `most`, of those that are `same` only the first.
 fn one_by_one(world: &World, ray: &Ray, most: usize, same: impl Fn(&Hit, &Hit) -> bool) -> Vec<Hit> {
     let mut hits: Vec<Hit> = Vec::new();
-    let mut after = None;
-    while let Some(hit) = world.next_hit(ray, RayKinds::CAMERA, f32::INFINITY, after)
+    let mut after: Option<Hit> = None;
+    while let Some(hit) = world.next_hit(ray, RayKinds::CAMERA, after.as_ref())
         && hits.len() < most
     {
-        after = Some(hit.rank());
+        after = Some(hit);
         if !hits.iter().any(|known| same(known, &hit)) {
             hits.push(hit);
         }
@@ -243,8 +244,8 @@ fn the_first_hits_of_a_ray_are_those_found_one_by_one() {
         // What is absent is as if it were not there; so is all up to a rank.
         let all = one_by_one(&world, &ray, 64, |_, _| false);
         if let [first, second, rest @ ..] = &all[..] {
-            let absent = [second.rank()];
-            world.first_hits(&ray, RayKinds::CAMERA, (Some(first.rank()), &absent), 64, |_, _| false, &mut hits);
+            let absent = [second.facet()];
+            world.first_hits(&ray, RayKinds::CAMERA, (Some(first), &absent), 64, |_, _| false, &mut hits);
             assert_eq!(hits, rest);
         }
     }

@@ -158,6 +158,7 @@ fn joined(a: PixelRect, b: PixelRect) -> PixelRect {
 mod tests {
     use super::*;
     use crate::diag::Diagnostics;
+    use crate::live::Redone;
     use crate::render::stats::Stats;
 
     const WHOLE: PixelRect = PixelRect { x0: 0, y0: 0, x1: 8, y1: 4 };
@@ -171,6 +172,7 @@ mod tests {
             layers: vec![layer.clone()],
             channels: Vec::new(),
             changed,
+            redone: Redone::default(),
             stats: Stats::default(),
             warnings: Diagnostics::default(),
             script_errors: Diagnostics::default(),

@@ -8,16 +8,19 @@
 //! 4. `board` and `server`: the page in a browser; `tev`: the same pictures in that viewer; `outputs`: picture files.
 
 mod board;
+mod change;
 pub mod controls;
 pub mod edit;
 mod follow;
 mod outputs;
 mod server;
 pub mod session;
+mod stages;
 mod tev;
 pub mod watch;
 
 pub use server::PageOptions;
 pub use session::{Event, LivePicture, Session, SessionOptions, Setup};
+pub use stages::Redone;
 pub use tev::DEFAULT_ADDRESS as TEV_ADDRESS;
 pub use watch::{News, Watch, WatchHandle, WatchOptions};

@@ -5,13 +5,14 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 
-use crate::diag::{Diagnostic, Diagnostics};
+use super::stages::{Outcome, Prepared, Redone, Stages};
+use crate::diag::{Diagnostic, Diagnostics, Source};
 use crate::film::{FilmTile, Layer};
-use crate::plan::Plan;
 use crate::render::stats::Stats;
 use crate::render::{Control, RenderOptions, render};
 use crate::sample::PixelRect;
 use crate::scene::Scene;
+use crate::scene::settings::RenderSettings;
 use crate::shade::Shaders;
 
 /// What is to be shown.
@@ -61,6 +62,8 @@ pub struct LivePicture {
     pub channels: Vec<Vec<f32>>,
     /// What may differ from the picture shown before.
     pub changed: PixelRect,
+    /// What was done again for it.
+    pub redone: Redone,
     /// What it cost.
     pub stats: Stats,
     /// What the gate stopped.
@@ -154,6 +157,27 @@ impl Session {
         state.generation
     }
 
+    /// Gives a script of the scene another text; all else stays as it was set last. `name` is what messages call the
+    /// script, or the end of it behind a `/`. Modules and textures that the text names must be among those that the
+    /// scene's scripts name already. Returns the generation and the warnings.
+    ///
+    /// # Errors
+    /// If nothing was set, there is no such script, or the text is at fault; then what was shown before stays.
+    pub fn set_shader(&self, name: &str, text: &str) -> Result<(u64, Diagnostics), Diagnostics> {
+        let setup = self.setup().ok_or_else(|| Diagnostic::error("the session has no scene yet"))?;
+        let mut builder = setup.scene.clone().into_builder();
+        let is_meant = |known: &str| known == name || known.strip_suffix(name).is_some_and(|rest| rest.ends_with('/'));
+        let Some(script) = builder.scripts.iter_mut().find(|script| is_meant(&script.source.name)) else {
+            let names: Vec<&str> = setup.scene.scripts().iter().map(|script| script.source.name.as_str()).collect();
+            let fault = Diagnostic::error(format!("the scene has no script `{name}`"));
+            return Err(fault.hint(format!("it has: {}", names.join(", "))).into());
+        };
+        script.source = Source::new(script.source.name.clone(), text);
+        let scene = builder.build()?;
+        let (shaders, warnings) = setup.shaders.compile_again(&scene)?;
+        Ok((self.set_scene(Setup { scene, shaders, layers: setup.layers.clone() }), warnings))
+    }
+
     /// The setup that is shown or being worked on.
     #[must_use]
     pub fn setup(&self) -> Option<Arc<Setup>> {
@@ -223,81 +247,198 @@ impl Shared {
 
     /// The worker's life.
     fn work(&self) {
-        loop {
-            let (setup, generation) = {
-                let mut state = self.lock();
-                loop {
-                    if state.closed {
-                        return;
-                    }
-                    if let Some(setup) = state.next.take() {
-                        self.cancel.store(false, Ordering::Relaxed);
-                        state.setup = Some(Arc::clone(&setup));
-                        break (setup, state.generation);
-                    }
-                    state = self.changed.wait(state).unwrap_or_else(PoisonError::into_inner);
-                }
-            };
+        let pool = match rayon::ThreadPoolBuilder::new().num_threads(self.options.threads).build() {
+            Ok(pool) => pool,
+            Err(error) => return self.give_up(&Diagnostic::error(format!("cannot start rendering threads: {error}"))),
+        };
+        let mut kept = Kept::default();
+        while let Some((setup, generation)) = self.next_setup() {
             self.tell(&Event::Begun { generation });
-            if let Err(faults) = self.show(&setup, generation) {
-                self.lock().failed = Some((generation, faults.clone()));
-                self.tell(&Event::Failed { generation, faults });
-                self.changed.notify_all();
+            if let Err(faults) = pool.install(|| self.show(&setup, generation, &mut kept)) {
+                self.fail(generation, faults);
             }
         }
     }
 
+    /// Waits for a setup that nobody has worked on yet; `None` once the session is closed.
+    fn next_setup(&self) -> Option<(Arc<Setup>, u64)> {
+        let mut state = self.lock();
+        loop {
+            if state.closed {
+                return None;
+            }
+            if let Some(setup) = state.next.take() {
+                self.cancel.store(false, Ordering::Relaxed);
+                state.setup = Some(Arc::clone(&setup));
+                return Some((setup, state.generation));
+            }
+            state = self.changed.wait(state).unwrap_or_else(PoisonError::into_inner);
+        }
+    }
+
+    fn fail(&self, generation: u64, faults: Diagnostics) {
+        self.lock().failed = Some((generation, faults.clone()));
+        self.tell(&Event::Failed { generation, faults });
+        self.changed.notify_all();
+    }
+
+    /// Answers every setup with a fault.
+    fn give_up(&self, fault: &Diagnostic) {
+        while let Some((_, generation)) = self.next_setup() {
+            self.fail(generation, fault.clone().into());
+        }
+    }
+
     /// Renders all pictures of a setup, until the final one or until a newer setup has come.
-    fn show(&self, setup: &Setup, generation: u64) -> Result<(), Diagnostics> {
+    fn show(&self, setup: &Arc<Setup>, generation: u64, kept: &mut Kept) -> Result<(), Diagnostics> {
         let last = setup.scene.render().samples;
         let mut samples = if self.options.progressive { 1 } else { last };
-        loop {
-            let mut builder = setup.scene.clone().into_builder();
-            builder.render.samples = samples;
-            let scene = builder.build()?;
-            let plan = Plan::new(&scene, &setup.shaders, &setup.layers);
-            let size = scene.render().size;
-            let whole = PixelRect::of_size(size);
-            let counts: usize = setup.layers.iter().map(|layer| layer.channels().len()).sum();
-            let channels = Mutex::new(vec![vec![0.0; whole.pixels()]; counts]);
-            let progress = |share: f64| self.tell(&Event::Progress { generation, samples, share });
-            let control = Control { cancel: Some(&self.cancel), progress: Some(&progress) };
-            let options =
-                RenderOptions { threads: self.options.threads, tile: self.options.tile, ..Default::default() };
-            let put = |tile: &FilmTile| {
-                let mut channels = channels.lock().unwrap_or_else(PoisonError::into_inner);
-                for (all, part) in channels.iter_mut().zip(&tile.channels) {
-                    let width = tile.rect.width() as usize;
-                    for (row, values) in part.chunks(width).enumerate() {
-                        let start = (tile.rect.y0 as usize + row) * size[0] as usize + tile.rect.x0 as usize;
-                        all[start..start + width].copy_from_slice(values);
+        if let Some(stages) = &mut kept.stages {
+            let prepared = Prepared::new(setup, stages.samples(), Some(stages.prepared()))?;
+            let redo = stages.redo_for(&prepared);
+            if !redo.trace && (stages.samples() == last || (self.options.progressive && stages.samples() < last)) {
+                let slow = stages.seconds_to_shade(&redo) > PATIENCE;
+                stages.set(prepared, &redo);
+                if slow && self.options.progressive && stages.samples() > 1 {
+                    let preview = Prepared::new(setup, 1, Some(stages.prepared()))?;
+                    let mut preview = Stages::new(preview, self.options.tile, false);
+                    kept.shown = false;
+                    if !self.bring_up_to_date(&mut preview, generation, last, true) {
+                        return Ok(());
                     }
                 }
-                Ok(())
-            };
-            let report = render(&scene, &setup.shaders, &plan, &options, &control, &put)?;
-            if !report.complete {
-                return Ok(());
+                let is_done = self.bring_up_to_date(stages, generation, last, !kept.shown);
+                kept.shown |= is_done;
+                if !is_done || stages.samples() == last {
+                    return Ok(());
+                }
+                samples = (stages.samples() * 2).min(last);
             }
-            let picture = Arc::new(LivePicture {
-                generation,
-                samples,
-                is_final: samples == last,
-                size,
-                layers: setup.layers.clone(),
-                channels: channels.into_inner().unwrap_or_else(PoisonError::into_inner),
-                changed: whole,
-                stats: report.stats,
-                warnings: report.warnings,
-                script_errors: report.script_errors,
-            });
-            self.lock().picture = Some(Arc::clone(&picture));
-            self.tell(&Event::Picture(picture));
-            self.changed.notify_all();
-            if samples == last {
+        }
+        loop {
+            let prepared = Prepared::new(setup, samples, kept.stages.as_ref().map(Stages::prepared))?;
+            let is_done = match self.cache_for(kept.stages.as_ref(), &prepared) {
+                Cache::Nothing => {
+                    *kept = Kept::default();
+                    self.stream(&prepared, generation, samples == last)?
+                }
+                cache => {
+                    let mut stages = Stages::new(prepared, self.options.tile, cache == Cache::All);
+                    let is_done = self.bring_up_to_date(&mut stages, generation, last, true);
+                    if is_done {
+                        *kept = Kept { stages: Some(stages), shown: true };
+                    }
+                    is_done
+                }
+            };
+            if !is_done || samples == last {
                 return Ok(());
             }
             samples = (samples * 2).min(last);
         }
     }
+
+    /// How much of a picture fits into the memory that may be used.
+    fn cache_for(&self, half: Option<&Stages>, prepared: &Prepared) -> Cache {
+        let [with_records, without] = half.map_or(BYTES_PER_SAMPLE, Stages::bytes_per_sample);
+        let render = prepared.scene.render();
+        let samples = u64::from(render.size[0]) * u64::from(render.size[1]) * u64::from(render.samples);
+        match samples.saturating_mul(with_records) {
+            bytes if bytes <= self.options.cache_bytes => Cache::All,
+            _ if samples.saturating_mul(without) <= self.options.cache_bytes => Cache::Samples,
+            _ => Cache::Nothing,
+        }
+    }
+
+    /// Does what is due, and shows the picture; whether it was not cancelled.
+    fn bring_up_to_date(&self, stages: &mut Stages, generation: u64, last: u32, shows_all: bool) -> bool {
+        let samples = stages.samples();
+        let progress = |share: f64| self.tell(&Event::Progress { generation, samples, share });
+        let control = Control { cancel: Some(&self.cancel), progress: Some(&progress) };
+        let Some(Outcome { report, redone, changed }) = stages.work(&control) else { return false };
+        let scene = &stages.prepared().scene;
+        let whole = PixelRect::of_size(scene.render().size);
+        self.show_picture(LivePicture {
+            generation,
+            samples,
+            is_final: samples == last,
+            size: scene.render().size,
+            layers: stages.prepared().plan.layers.clone(),
+            channels: stages.channels().to_vec(),
+            changed: if shows_all { whole } else { changed },
+            redone,
+            stats: report.stats,
+            warnings: report.warnings,
+            script_errors: report.script_errors,
+        });
+        true
+    }
+
+    fn show_picture(&self, picture: LivePicture) {
+        let picture = Arc::new(picture);
+        self.lock().picture = Some(Arc::clone(&picture));
+        self.tell(&Event::Picture(picture));
+        self.changed.notify_all();
+    }
+
+    /// Renders a picture of which nothing can be kept; whether it was not cancelled.
+    fn stream(&self, prepared: &Prepared, generation: u64, is_final: bool) -> Result<bool, Diagnostics> {
+        let Prepared { scene, plan, setup, .. } = prepared;
+        let RenderSettings { size, samples, .. } = *scene.render();
+        let whole = PixelRect::of_size(size);
+        let counts: usize = plan.layers.iter().map(|layer| layer.channels().len()).sum();
+        let channels = Mutex::new(vec![vec![0.0; whole.pixels()]; counts]);
+        let progress = |share: f64| self.tell(&Event::Progress { generation, samples, share });
+        let control = Control { cancel: Some(&self.cancel), progress: Some(&progress) };
+        let options = RenderOptions { threads: self.options.threads, tile: self.options.tile, ..Default::default() };
+        let put = |tile: &FilmTile| {
+            let mut channels = channels.lock().unwrap_or_else(PoisonError::into_inner);
+            for (all, part) in channels.iter_mut().zip(&tile.channels) {
+                tile.rect.copy_into(part, all, whole.width() as usize);
+            }
+            Ok(())
+        };
+        let report = render(scene, &setup.shaders, plan, &options, &control, &put)?;
+        if report.complete {
+            self.show_picture(LivePicture {
+                generation,
+                samples,
+                is_final,
+                size,
+                layers: plan.layers.clone(),
+                channels: channels.into_inner().unwrap_or_else(PoisonError::into_inner),
+                changed: whole,
+                redone: Redone::everything(scene),
+                stats: report.stats,
+                warnings: report.warnings,
+                script_errors: report.script_errors,
+            });
+        }
+        Ok(report.complete)
+    }
+}
+
+/// Longer than this, in seconds, nobody should wait for a picture: one of fewer samples comes first.
+const PATIENCE: f64 = 0.3;
+
+/// About what a sample takes in memory with and without what its rays met, before anything was measured.
+const BYTES_PER_SAMPLE: [u64; 2] = [160, 90];
+
+/// What the worker keeps between setups.
+#[derive(Default)]
+struct Kept {
+    stages: Option<Stages>,
+    /// Whether the picture that was shown last is theirs.
+    shown: bool,
+}
+
+/// What is kept of a picture.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Cache {
+    /// Samples, lines and what rays met.
+    All,
+    /// Not what rays met.
+    Samples,
+    /// No more than the picture.
+    Nothing,
 }

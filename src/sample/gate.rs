@@ -1,7 +1,7 @@
 //! The gate: the one place where NaN, infinity and absurd numbers from scripts are stopped (DESIGN section 3.7).
 //!
-//! Neutral values: a component of a colour, feature, uv, position, throughput, contribution or AOV, or a footprint, that is NaN or
-//! infinite becomes 0; a width that is NaN, infinite or negative becomes 0 (no line); a width above the largest is
+//! Neutral values: a component of a colour, alpha, feature, uv, position, throughput, contribution or AOV, or a footprint, that is
+//! NaN or infinite becomes 0, and one beyond ±[`LARGEST`] counts as infinite, so that no sum over a filter can overflow; a width that is NaN, infinite or negative becomes 0 (no line); a width above the largest is
 //! clamped to it; an opacity that is NaN or infinite becomes 0 (no line), any other is clamped to 0 … 1; a normal that is not finite or has no length becomes +Z, any other is brought to unit length; the
 //! depth of a hit that is not finite becomes the largest finite number. What is stopped is counted by material, once per
 //! node and kind however many of its numbers are bad; a normal without length counts as NaN, which it would become.
@@ -14,12 +14,15 @@ use super::buffer::{Node, NodeColumnSet};
 use super::path::NodePath;
 use crate::math::DVec3;
 
+/// Numbers beyond this, either way, count as infinite: a film may add a hundred million of them up.
+pub const LARGEST: f32 = 1e30;
+
 /// What the gate stopped, for one material (or summed).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct GateCounts {
     /// Nodes with at least one NaN.
     pub nan: u64,
-    /// Nodes with at least one infinity.
+    /// Nodes with at least one infinity, or a number beyond ±[`LARGEST`] where that counts as one.
     pub infinite: u64,
     /// Nodes with a negative line width.
     pub negative: u64,
@@ -59,16 +62,22 @@ impl Faults {
         0.0
     }
 
-    /// [`Self::number`] of each component.
+    /// A number that may be summed: itself, or 0 and a fault.
+    #[inline]
+    fn summand(&mut self, x: f32) -> f32 {
+        self.number(if x.abs() > LARGEST { f32::INFINITY } else { x })
+    }
+
+    /// [`Self::summand`] of each component.
     #[inline]
     pub(super) fn numbers<const N: usize>(&mut self, x: [f32; N]) -> [f32; N] {
-        x.map(|x| self.number(x))
+        x.map(|x| self.summand(x))
     }
 
     fn normal(&mut self, normal: [f32; 3]) -> [f32; 3] {
         const NEUTRAL: [f32; 3] = [0.0, 0.0, 1.0];
         let mut own = Self::default();
-        let clean = own.numbers(normal);
+        let clean = normal.map(|x| own.number(x));
         *self |= own;
         if !own.is_empty() {
             return NEUTRAL;
@@ -133,7 +142,7 @@ pub(super) fn clean_node(node: Node, kept: NodeColumnSet, max_width: f32) -> (No
     }
     if kept.overlap {
         node.geometric_normal = faults.normal(node.geometric_normal);
-        node.footprint = faults.number(node.footprint).abs();
+        node.footprint = faults.summand(node.footprint).abs();
     }
     if kept.throughput {
         node.throughput = faults.numbers(node.throughput);

@@ -74,6 +74,8 @@ pub struct Material {
     pub params: BTreeMap<String, (ParamValue, Option<Span>)>,
     /// Priority of its surfaces where neither the script nor the object gives one.
     pub priority: Option<i32>,
+    /// Which of overlapping bodies fills the space that they share: the one with the larger number.
+    pub dielectric_priority: i32,
     /// Whether surfaces are seen from behind. Single-sided surfaces are invisible from behind to camera, reflection
     /// and refraction rays, but cast shadows.
     pub double_sided: bool,

@@ -1,5 +1,7 @@
 //! Triangle meshes, stored once and placed any number of times.
 
+use rayon::prelude::*;
+
 use crate::math::{Vec2, Vec3, Vec4};
 
 /// A triangle mesh in its own space. Attributes are per vertex and either empty (absent) or as long as `positions`.
@@ -30,5 +32,54 @@ impl Mesh {
     #[must_use]
     pub fn slot_count(&self) -> usize {
         self.slots.iter().max().map_or(1, |slot| usize::from(*slot) + 1)
+    }
+
+    /// Whether the triangles enclose a space: along each edge as many run one way as the other. Corners at one place are one
+    /// corner; triangles that have two of them there count for nothing.
+    #[must_use]
+    pub fn is_closed(&self) -> bool {
+        let mut places: Vec<([u32; 3], u32)> =
+            self.positions.iter().map(|position| position.to_array().map(|x| (x + 0.0).to_bits())).zip(0..).collect();
+        places.par_sort_unstable();
+        let mut corner = vec![0; places.len()];
+        for same in places.chunk_by(|a, b| a.0 == b.0) {
+            for (_, vertex) in same {
+                corner[*vertex as usize] = same[0].1;
+            }
+        }
+        // The lower corner first, and whether the edge runs from there.
+        let mut edges: Vec<(u32, u32, bool)> = Vec::with_capacity(self.triangles.len() * 3);
+        for triangle in &self.triangles {
+            let [a, b, c] = triangle.map(|vertex| corner[vertex as usize]);
+            if a != b && b != c && c != a {
+                edges.extend([(a, b), (b, c), (c, a)].map(|(from, to)| (from.min(to), from.max(to), from < to)));
+            }
+        }
+        edges.par_sort_unstable();
+        let is_even = |edge: &[(u32, u32, bool)]| edge.iter().filter(|(.., up)| *up).count() * 2 == edge.len();
+        !edges.is_empty() && edges.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)).all(is_even)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_mesh_is_closed_if_no_edge_is_open() {
+        let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(Vec3::from);
+        let faces = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]];
+        let mut mesh = Mesh { positions: corners.to_vec(), triangles: faces.to_vec(), ..Mesh::default() };
+        assert!(mesh.is_closed());
+        // Corners of their own for each face change nothing, nor does a triangle without area.
+        mesh.positions = faces.iter().flatten().map(|corner| corners[*corner as usize]).collect();
+        mesh.triangles = (0..4).map(|face| [face * 3, face * 3 + 1, face * 3 + 2]).collect();
+        mesh.triangles.push([0, 1, 1]);
+        assert!(mesh.is_closed());
+        mesh.triangles[2].reverse();
+        assert!(!mesh.is_closed(), "one face looks inwards");
+        mesh.triangles.remove(2);
+        assert!(!mesh.is_closed(), "one face is missing");
+        assert!(!Mesh::default().is_closed());
     }
 }

@@ -27,6 +27,8 @@ pub struct Bsdf {
     pub occlusion: f32,
     /// Whether the ray comes from outside the body.
     pub outside: bool,
+    /// Index of refraction of what surrounds the body there; 1 in air.
+    pub surrounding: f32,
 }
 
 /// Where ideal reflection and refraction go on, and how much of them the viewer sees.
@@ -66,13 +68,14 @@ impl Bsdf {
 
     /// Reflectance at normal incidence of the dielectric part, `specular` included.
     fn dielectric_f0(&self) -> f32 {
-        let r = (self.ior - 1.0) / (self.ior + 1.0);
+        let relative = self.ior / self.surrounding;
+        let r = (relative - 1.0) / (relative + 1.0);
         r * r * self.specular
     }
 
     /// The index of refraction on the viewer's side over the one behind.
     pub fn eta(&self) -> f32 {
-        if self.outside { 1.0 / self.ior } else { self.ior }
+        if self.outside { self.surrounding / self.ior } else { self.ior / self.surrounding }
     }
 
     fn diffuse_color(&self) -> Vec3 {
@@ -226,6 +229,7 @@ mod tests {
             normal: Vec3::Z,
             occlusion: 1.0,
             outside: true,
+            surrounding: 1.0,
         }
     }
 

@@ -65,15 +65,15 @@ pub struct Shader {
     pub(super) program: Arc<Program>,
     pub(super) record: ParameterRecord,
     /// The kernel, or why there is none; `None` if the interpreter was asked for.
-    kernel: Option<Result<Arc<Kernel>, Finding>>,
+    pub(super) kernel: Option<Result<Arc<Kernel>, Finding>>,
     /// What styles lines, if the script has such a function.
     pub(super) line: Option<LineShader>,
     /// Kernels for batches with another number of lights than the scene has.
     other_kernels: Mutex<Vec<(usize, Option<Arc<Kernel>>)>>,
-    material_id: u32,
-    light_count: usize,
-    textures: Arc<[Arc<Texture>]>,
-    natives: Arc<[NativeFunction]>,
+    pub(super) material_id: u32,
+    pub(super) light_count: usize,
+    pub(super) textures: Arc<[Arc<Texture>]>,
+    pub(super) natives: Arc<[NativeFunction]>,
     pub(super) attributes: Arc<Vec<AttributeSet>>,
 }
 
@@ -202,7 +202,7 @@ impl Shader {
         Some(self.program.found(blame))
     }
 
-    fn lower(&self, entry: Entry, light_count: usize) -> Result<Arc<Kernel>, Finding> {
+    pub(super) fn lower(&self, entry: Entry, light_count: usize) -> Result<Arc<Kernel>, Finding> {
         let surroundings = Surroundings {
             textures: &self.textures,
             attributes: &self.attributes,
@@ -226,6 +226,7 @@ pub struct Shaders {
     shaders: Vec<Shader>,
     aovs: Vec<String>,
     host: Host,
+    mode: ShadingMode,
     /// Every name that some script's `params()` has.
     parameters: BTreeSet<String>,
     /// The scene's, for scripts that name images.
@@ -335,7 +336,15 @@ impl Shaders {
         let parameters = scripts.iter().flatten().flat_map(|(_, defaults)| defaults.0.keys().cloned()).collect();
         let aovs = extra_outputs(&shaders);
         let textures = scene.textures().to_vec();
-        Ok((Self { shaders, aovs, host: host.clone(), parameters, textures }, faults))
+        Ok((Self { shaders, aovs, host: host.clone(), mode, parameters, textures }, faults))
+    }
+
+    /// Compiles the scripts of another scene with the same host, and runs them in the same way.
+    ///
+    /// # Errors
+    /// As [`compile_for`](Self::compile_for).
+    pub fn compile_again(&self, scene: &Scene) -> Result<(Self, Diagnostics), Diagnostics> {
+        Self::compile_for(scene, &self.host, self.mode)
     }
 
     /// All shaders, in the order of the materials.

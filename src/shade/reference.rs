@@ -37,6 +37,13 @@ fn surface(hit, p) {
 This page is made from the code: `tusche shader reference` prints it.
 ";
 
+/// What becomes of useless numbers.
+const GATE: &str = "
+What is outside of its range is brought into it; NaN in what describes scattering is the default. A colour or extra layer that is
+NaN, infinite or beyond ±1e30 at some hit is 0 there, such a normal is +Z, and a line whose width or opacity is NaN or infinite is not
+drawn. The render says which shader it was and how often, and `--stats` counts it. Kernels and the interpreter agree on all of this.
+";
+
 /// What stands before the tables of `line`.
 const LINES: &str = "
 ## Lines, one by one
@@ -74,6 +81,7 @@ pub fn markdown() -> String {
     }
     let extra = code(&format!("{AOV_PREFIX}NAME"));
     row(&mut page, &[&extra, "colour or number", "", "", "0", "an extra layer of the picture, called NAME"]);
+    page += GATE;
     page += LINES;
     page += "| name | type | unit or space | range | meaning |\n|---|---|---|---|---|\n";
     for input in PAIR_INPUTS {

@@ -19,16 +19,16 @@ use super::ray_tree::{Run, WaveHit, WaveRay};
 use super::scatter::Outputs;
 use super::triangle::Ray;
 use super::wave::{MOST_INVISIBLE, TileTracer, TraceContext, Work, value};
-use super::world::{Hit, HitRank};
+use super::world::{Facet, Hit};
 use crate::clock::CpuClock;
 use crate::sample::{Node, NodePath};
 use crate::scene::settings::RayKinds;
 use crate::shade::Mode;
 use crate::shade::bsdf::unit;
 
-/// A hit behind the first, shaded: its node's number, its place in the list, and its attributes, or its rank if it is not
+/// A hit behind the first, shaded: its node's number, its place in the list, and its attributes, or its triangle if it is not
 /// there.
-type Shaded = (u32, u32, Result<Node, HitRank>);
+type Shaded = (u32, u32, Result<Node, Facet>);
 
 impl Run {
     /// Forgets what lies behind hits that turned out invisible: their rays look for a new list.
@@ -55,7 +55,7 @@ impl TileTracer<'_> {
         ray: &Ray,
         kind: RayKinds,
         wave_ray: &WaveRay,
-        absent: &[HitRank],
+        absent: &[Facet],
         list: &mut Vec<Hit>,
     ) {
         let Some(tests) = self.plan.lines.as_ref().map(|lines| &lines.tests) else { return };
@@ -69,15 +69,15 @@ impl TileTracer<'_> {
                 (!tests.object || object(a) == object(b)) && (!tests.shader || same_material())
             }
         };
-        let from = (wave_ray.after, absent);
+        let from = (wave_ray.after.as_ref(), absent);
         self.world.first_hits(ray, kind, from, self.plan.surfaces as usize, same, list);
     }
 
     /// Shades the hits behind the first ones of a wave, as far as lines ask for it.
-    pub(super) fn shade_behind(&self, run: &mut Run, context: &mut TraceContext<'_>, work: &mut Work) {
+    pub(super) fn shade_behind(&self, run: &mut Run, context: &mut TraceContext<'_>, work: &mut Work<'_>) {
         let mut hits = std::mem::take(&mut run.behind);
         // By node: hits that are not there.
-        let mut absent: BTreeMap<u32, Vec<HitRank>> = BTreeMap::new();
+        let mut absent: BTreeMap<u32, Vec<Facet>> = BTreeMap::new();
         while !hits.is_empty() {
             hits.sort_by_key(|hit| hit.material);
             let mut shaded: Vec<Shaded> = Vec::with_capacity(hits.len());
@@ -128,12 +128,13 @@ impl TileTracer<'_> {
         group: &[WaveHit],
         run: &Run,
         context: &mut TraceContext<'_>,
-        work: &mut Work,
+        work: &mut Work<'_>,
         shaded: &mut Vec<Shaded>,
     ) {
         let Some(material) = group.first().map(|hit| hit.material) else { return };
         let plan = &self.plan.materials[material.index()];
-        let lights = if plan.behind.lights { self.light_samples(group, context, work) } else { Vec::new() };
+        let lights =
+            if plan.behind.lights { self.light_samples(group, &run.nodes, None, context, work) } else { Vec::new() };
         let clock = CpuClock::thread();
         let constant = plan.mode == Mode::Constant;
         if constant {
@@ -152,7 +153,7 @@ impl TileTracer<'_> {
             let outputs = Outputs { batch, row: if constant { 0 } else { index } };
             let opacity = unit(value(&batch.opacity, outputs.row, 1.0), 1.0);
             let cone = run.nodes[hit.ray.node as usize].cone;
-            let found = if opacity == 0.0 { Err(hit.hit.rank()) } else { Ok(self.attributes(hit, cone, outputs)) };
+            let found = if opacity == 0.0 { Err(hit.hit.facet()) } else { Ok(self.attributes(hit, cone, outputs)) };
             shaded.push((hit.ray.node, hit.place, found));
         }
     }

@@ -60,12 +60,13 @@ impl Block {
         let determinant = u + v + w;
         let [az, bz, cz] = [sz * az, sz * bz, sz * cz];
         let t = (u * az + v * bz + w * cz) / determinant;
-        let mut candidates = ((!outside & t.cmpgt(zero) & t.cmple(Vec4::splat(*t_max))) | edge).bitmask();
+        let largest = az.abs().max(bz.abs()).max(cz.abs());
+        let special = edge | (!outside & az.min(bz).min(cz).cmple(largest * NOT_AHEAD));
+        let mut candidates = ((!outside & t.cmpgt(zero) & t.cmple(Vec4::splat(*t_max))) | special).bitmask();
         if candidates == 0 {
             return true;
         }
-        let largest = az.abs().max(bz.abs()).max(cz.abs());
-        let special = (edge | az.min(bz).min(cz).cmple(largest * NOT_AHEAD)).bitmask();
+        let special = special.bitmask();
         let [t, v, w, determinant] = [t, v, w, determinant].map(|four| four.to_array());
         while candidates != 0 {
             let place = candidates.trailing_zeros() as usize % WIDTH;
@@ -73,7 +74,9 @@ impl Block {
             let hit = if special & (1 << place) == 0 {
                 let determinant = determinant[place];
                 let [u, v] = [v[place] / determinant, w[place] / determinant];
-                Some(TriangleHit { t: t[place], u, v, front: determinant > 0.0 })
+                let vertices = self.triangle(place).map_or([Vec3::NAN; 3], |(_, vertices)| vertices);
+                let slack = ray.slack(&vertices, t[place]);
+                Some(TriangleHit { t: t[place], u, v, front: determinant > 0.0, slack })
             } else {
                 self.triangle(place).and_then(|(_, vertices)| ray.triangle(&vertices, *t_max))
             };

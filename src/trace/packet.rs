@@ -10,7 +10,7 @@
 
 use super::mesh_tree::{MeshTree, WIDTH};
 use super::tree::{BOX_FAR_SCALE, BOX_NEAR_SCALE, Leaf, Slabs};
-use super::triangle::{NOT_AHEAD, Ray};
+use super::triangle::{MOST_SLACK, NOT_AHEAD, Ray, normal_and_size};
 use crate::math::{Mat3, Vec3, Vec4};
 
 /// Rays of a packet.
@@ -95,11 +95,17 @@ impl LaneRays {
         Self::new(origin, direction)
     }
 
-    /// One of the rays.
+    /// Where one of the rays starts.
     #[inline]
-    pub fn ray(&self, lane: usize) -> Ray {
-        let vector = |lanes: &[Lanes; 3]| Vec3::from_array(lanes.each_ref().map(|axis| axis[lane]));
-        Ray::new(vector(&self.origin), vector(&self.direction))
+    pub fn start(&self, lane: usize) -> Vec3 {
+        Vec3::from_array(self.origin.each_ref().map(|axis| axis[lane]))
+    }
+
+    /// One of the rays, with its grain.
+    #[inline]
+    pub fn ray(&self, lane: usize, grain: Vec3) -> Ray {
+        let direction = Vec3::from_array(self.direction.each_ref().map(|axis| axis[lane]));
+        Ray { grain, ..Ray::new(self.start(lane), direction) }
     }
 
     /// What the triangle test needs; `None` if the rays are no packet.
@@ -234,10 +240,13 @@ pub(super) struct Shear {
 }
 
 /// Hits of a packet's rays with one triangle.
+#[derive(Default)]
 pub(super) struct LaneHits {
     pub t: Lanes,
     pub u: Lanes,
     pub v: Lanes,
+    /// At least that of the single ray's hit.
+    pub slack: Lanes,
     /// 1: front, 2: back, 0: no hit.
     pub side: [u32; LANES],
 }
@@ -255,6 +264,12 @@ pub(super) trait Visit {
     /// How far each ray reaches now.
     fn reach(&self) -> &Lanes;
 
+    /// What a ray's [`Ray::grain`] is.
+    fn grain(&self, lane: usize) -> Vec3;
+
+    /// At least the largest component of any ray's origin and grain.
+    fn size(&self) -> f32;
+
     /// Takes the hits of one triangle.
     fn hit(&mut self, triangle: u32, hits: &LaneHits);
 }
@@ -269,7 +284,7 @@ pub(super) fn intersect(tree: &MeshTree, rays: &LaneRays, shear: &Shear, visit: 
             for block in tree.blocks(&leaf) {
                 for place in 0..WIDTH {
                     let Some((triangle, vertices)) = block.triangle(place) else { break };
-                    if let Some(hits) = shear.triangle(rays, &vertices, &near, &limit) {
+                    if let Some(hits) = shear.triangle(rays, visit, &vertices, &near, &limit) {
                         visit.hit(triangle, &hits);
                         let reach = visit.reach();
                         for i in 0..LANES {
@@ -287,7 +302,14 @@ pub(super) fn intersect(tree: &MeshTree, rays: &LaneRays, shear: &Shear, visit: 
 impl Shear {
     /// Where the rays meet a triangle within `limit`, as [`Ray::triangle`] and the mesh tree say; `None` if none does.
     #[inline(always)]
-    fn triangle(&self, rays: &LaneRays, vertices: &[Vec3; 3], near: &Lanes, limit: &Lanes) -> Option<LaneHits> {
+    fn triangle(
+        &self,
+        rays: &LaneRays,
+        visit: &impl Visit,
+        vertices: &[Vec3; 3],
+        near: &Lanes,
+        limit: &Lanes,
+    ) -> Option<LaneHits> {
         let [kx, ky, kz] = self.axes.map(|axis| axis.min(2));
         let [ox, oy, oz] = [kx, ky, kz].map(|axis| &rays.origin[axis]);
         let [[ax, ay, az], [bx, by, bz], [cx, cy, cz]] =
@@ -313,8 +335,12 @@ impl Shear {
         if any == 0 {
             return None;
         }
-        let mut hits = LaneHits { t: [0.0; LANES], u: [0.0; LANES], v: [0.0; LANES], side: [0; LANES] };
+        let mut hits = LaneHits::default();
         let mut any = 0;
+        let (normal, size) = normal_and_size(vertices, visit.size());
+        // Products of lanes may be fused or ordered otherwise than those of single rays.
+        let size = size * 2.0;
+        let [dx, dy, dz] = &rays.direction;
         for i in 0..LANES {
             let (u, v, w) = (us[i], vs[i], ws[i]);
             let sz = self.z[i];
@@ -324,22 +350,24 @@ impl Shear {
             let determinant = u + v + w;
             let t = (u * a + v * b + w * c) / determinant;
             let farthest = max(max(a.abs(), b.abs()), c.abs());
-            let special = edge | (min(min(a, b), c) <= farthest * NOT_AHEAD);
+            let special = edge | (!outside & (min(min(a, b), c) <= farthest * NOT_AHEAD));
             // See the head of `tree`.
             let entered = max(t, near[i]);
             let met = !outside & (t > 0.0) & (entered <= limit[i]);
             let side = if determinant > 0.0 { LaneHits::FRONT } else { LaneHits::BACK };
             let side = if met { side } else { LaneHits::NONE };
-            let asks = special & (met | (edge & (limit[i] >= 0.0)));
+            let asks = special & (limit[i] >= 0.0);
             let side = if asks { LaneHits::SPECIAL } else { side };
             hits.t[i] = entered;
             hits.u[i] = v / determinant;
             hits.v[i] = w / determinant;
+            let along = normal.x * dx[i] + normal.y * dy[i] + normal.z * dz[i];
+            hits.slack[i] = min(size / along.abs(), t * (2.0 * MOST_SLACK));
             hits.side[i] = side;
             any |= side;
         }
         if any & LaneHits::SPECIAL != 0 {
-            any = ask(rays, vertices, near, limit, &mut hits);
+            any = ask(rays, visit, vertices, near, limit, &mut hits);
         }
         (any != 0).then_some(hits)
     }
@@ -347,17 +375,24 @@ impl Shear {
 
 /// Replaces special lanes by what the single ray meets; whether any lane meets the triangle.
 #[cold]
-fn ask(rays: &LaneRays, vertices: &[Vec3; 3], near: &Lanes, limit: &Lanes, hits: &mut LaneHits) -> u32 {
+fn ask(
+    rays: &LaneRays,
+    visit: &impl Visit,
+    vertices: &[Vec3; 3],
+    near: &Lanes,
+    limit: &Lanes,
+    hits: &mut LaneHits,
+) -> u32 {
     for i in 0..LANES {
         if hits.side[i] & LaneHits::SPECIAL == 0 {
             continue;
         }
         hits.side[i] = LaneHits::NONE;
-        if let Some(hit) = rays.ray(i).triangle(vertices, limit[i]) {
+        if let Some(hit) = rays.ray(i, visit.grain(i)).triangle(vertices, limit[i]) {
             let t = hit.t.max(near[i]);
             if t <= limit[i] {
                 hits.side[i] = if hit.front { LaneHits::FRONT } else { LaneHits::BACK };
-                (hits.t[i], hits.u[i], hits.v[i]) = (t, hit.u, hit.v);
+                (hits.t[i], hits.u[i], hits.v[i], hits.slack[i]) = (t, hit.u, hit.v, hit.slack);
             }
         }
     }
@@ -372,11 +407,10 @@ pub(super) fn one_by_one(tree: &MeshTree, rays: &LaneRays, visit: &mut impl Visi
         if reach < 0.0 {
             continue;
         }
-        tree.intersect(&rays.ray(lane), &mut reach, |triangle, hit, reach| {
-            let mut hits =
-                LaneHits { t: [0.0; LANES], u: [0.0; LANES], v: [0.0; LANES], side: [LaneHits::NONE; LANES] };
+        tree.intersect(&rays.ray(lane, visit.grain(lane)), &mut reach, |triangle, hit, reach| {
+            let mut hits = LaneHits::default();
             hits.side[lane] = if hit.front { LaneHits::FRONT } else { LaneHits::BACK };
-            (hits.t[lane], hits.u[lane], hits.v[lane]) = (hit.t, hit.u, hit.v);
+            (hits.t[lane], hits.u[lane], hits.v[lane], hits.slack[lane]) = (hit.t, hit.u, hit.v, hit.slack);
             visit.hit(triangle, &hits);
             *reach = visit.reach()[lane];
             *reach >= 0.0

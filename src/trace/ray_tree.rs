@@ -1,8 +1,10 @@
 //! The ray trees of a run of samples while they are traced.
 
 use super::cone::Cone;
+use super::media::{Crossing, Media};
+use super::record::RunRecord;
 use super::surface::Surface;
-use super::world::{Hit, HitRank};
+use super::world::Hit;
 use crate::math::Vec3;
 use crate::sample::{Node, NodePath};
 use crate::scene::ids::MaterialId;
@@ -68,8 +70,19 @@ pub(super) struct WaveRay {
     pub node: u32,
     /// The last of the invisible surfaces that the ray has passed, and their number. It goes on from where it started,
     /// so that what it meets next is what it would have met without them.
-    pub after: Option<HitRank>,
+    pub after: Option<Hit>,
     pub passed: u32,
+    /// Which of the run's media it is in.
+    pub media: u32,
+    /// Bodies at the place ahead that it is known to enter.
+    pub counted: u32,
+}
+
+impl WaveRay {
+    /// The ray behind a hit that it passed as if nothing was there, in other media.
+    pub fn going_on(&self, after: &Hit, media: usize) -> Self {
+        Self { after: Some(*after), passed: self.passed + 1, media: media as u32, counted: 0, ..*self }
+    }
 }
 
 /// A ray that met a surface, on its way to be shaded.
@@ -83,6 +96,8 @@ pub(super) struct WaveHit {
     pub depth: f32,
     /// Its place in the surface list of its ray: 0 for the first, which makes the picture; only the line pass sees others.
     pub place: u32,
+    /// Which of the run's crossings it is part of.
+    pub crossing: Option<u32>,
 }
 
 /// A run of samples: their trees so far, and the rays that are still to be traced.
@@ -98,21 +113,31 @@ pub(super) struct Run {
     pub behind: Vec<WaveHit>,
     /// What the line pass will see of surfaces behind the first: the node, the place in its list, and the attributes.
     pub surfaces: Vec<(u32, u32, Node)>,
+    /// Media of its rays: the first is air.
+    pub media: Vec<Media>,
+    /// How rays of this wave pass surfaces of bodies.
+    pub crossings: Vec<Crossing>,
     /// World position at each camera node, if the plan keeps them.
     pub positions: Vec<Vec3>,
     /// Extra outputs at each camera node, `aov_count` each.
     pub aovs: Vec<Vec3>,
+    /// What its rays met, if somebody wants to know later.
+    pub record: RunRecord,
 }
 
 impl Run {
     /// Empties the run and keeps its memory.
     pub fn clear(&mut self) {
-        let Self { nodes, again, next, behind, surfaces, positions, aovs } = self;
+        // The record is told whether it is wanted.
+        let Self { nodes, again, next, behind, surfaces, media, crossings, positions, aovs, record: _ } = self;
         nodes.clear();
         again.clear();
         next.clear();
         behind.clear();
         surfaces.clear();
+        media.clear();
+        media.push(Media::AIR);
+        crossings.clear();
         positions.clear();
         aovs.clear();
     }

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use super::cone::Cone;
+use super::media::{Crossing, Pass};
 use super::ray_tree::{Run, TreeNode, WaveHit, WaveRay};
 use super::wave::{TileTracer, TraceContext, Work, value};
 use crate::clock::CpuClock;
@@ -33,32 +34,62 @@ impl TileTracer<'_> {
         group: &[WaveHit],
         run: &mut Run,
         context: &mut TraceContext<'_>,
-        work: &mut Work,
+        work: &mut Work<'_>,
     ) {
         let Some(material) = group.first().map(|hit| hit.material) else { return };
         let plan = &self.plan.materials[material.index()];
-        let lights = if plan.lights { self.light_samples(group, context, work) } else { Vec::new() };
+        let lights = self.shade(group, run, context, work);
         let lights_per_hit = if plan.lights { self.lighting.len() } else { 0 };
+        for (index, hit) in group.iter().enumerate() {
+            let outputs = self.outputs_of(material, index, context);
+            let lights = &lights[index * lights_per_hit..(index + 1) * lights_per_hit];
+            self.finish(hit, plan, outputs, lights, run);
+        }
+    }
 
+    /// Runs the shader of hits of one material, of which there is at least one; returns what lights give them, if anybody asks.
+    pub(super) fn shade(
+        &self,
+        group: &[WaveHit],
+        run: &mut Run,
+        context: &mut TraceContext<'_>,
+        work: &mut Work<'_>,
+    ) -> Vec<LightSample> {
+        let Some(material) = group.first().map(|hit| hit.material) else { return Vec::new() };
+        let plan = &self.plan.materials[material.index()];
+        let lights = if plan.lights {
+            self.light_samples(group, &run.nodes, Some(&mut run.record), context, work)
+        } else {
+            Vec::new()
+        };
         let clock = CpuClock::thread();
-        let constant = plan.mode == Mode::Constant;
-        if constant {
+        if plan.mode == Mode::Constant {
             self.evaluate_once(material, context);
         } else {
             self.evaluate(material, group, run, &lights, (plan.wanted | self.marker, plan.inputs), context);
         }
         work.hits[material.index()] += group.len() as u64;
         work.shade_seconds[material.index()] += clock.seconds();
+        lights
+    }
 
-        let batch = match &context.constants[material.index()] {
-            Some(outputs) if constant => outputs,
-            _ => &context.outputs,
-        };
-        for (index, hit) in group.iter().enumerate() {
-            let outputs = Outputs { batch, row: if constant { 0 } else { index } };
-            let lights = &lights[index * lights_per_hit..(index + 1) * lights_per_hit];
-            self.finish(hit, plan, outputs, lights, run);
+    /// What the shader returned for one of the hits that were shaded last.
+    pub(super) fn outputs_of<'c>(
+        &self,
+        material: MaterialId,
+        index: usize,
+        context: &'c TraceContext<'_>,
+    ) -> Outputs<'c> {
+        let constant = self.plan.materials[material.index()].mode == Mode::Constant;
+        match &context.constants[material.index()] {
+            Some(batch) if constant => Outputs { batch, row: 0 },
+            _ => Outputs { batch: &context.outputs, row: index },
         }
+    }
+
+    /// How much of a surface is there.
+    pub(super) fn opacity(&self, Outputs { batch, row }: Outputs<'_>) -> f32 {
+        unit(value(&batch.opacity, row, 1.0), 1.0)
     }
 
     /// Runs the shader of a constant material, once per context.
@@ -185,12 +216,13 @@ impl TileTracer<'_> {
     fn finish(&self, hit: &WaveHit, plan: &MaterialPlan, outputs: Outputs<'_>, lights: &[LightSample], run: &mut Run) {
         let direction = hit.ray.direction;
         let Outputs { batch, row } = outputs;
-        let opacity = unit(value(&batch.opacity, row, 1.0), 1.0);
-        if opacity == 0.0 {
-            // Not there: the ray goes on for the same node.
-            run.again.push(WaveRay { after: Some(hit.hit.rank()), passed: hit.ray.passed + 1, ..hit.ray });
+        let opacity = self.opacity(outputs);
+        let crossing = hit.crossing.and_then(|index| run.crossings.get(index as usize)).copied();
+        if let Some(again) = self.passes(hit, outputs, opacity, crossing.as_ref(), run) {
+            run.again.push(again);
             return;
         }
+        let inside = run.media.get(hit.ray.media as usize).map_or(1.0, |media| media.index);
 
         // What the line pass and the layers need.
         let index = hit.ray.node as usize;
@@ -212,10 +244,18 @@ impl TileTracer<'_> {
         let mut bounces = Bounces::default();
         let mut mirrored = Vec3::ZERO;
         let mut eta = 1.0;
+        let mut media = hit.ray.media;
         if let Some(color) = value(&batch.color, row, None) {
             node.radiance = color * opacity;
         } else if self.plan.color || plan.reflects || plan.refracts {
-            let bsdf = self.bsdf(hit, outputs);
+            let mut bsdf = self.bsdf(hit, outputs, inside);
+            if let Some(crossing) = &crossing {
+                bsdf.surrounding = match crossing.pass {
+                    Pass::Thin => bsdf.ior,
+                    Pass::Bends if !crossing.enters => crossing.behind.settled().index,
+                    _ => inside,
+                };
+            }
             mirrored = bsdf.mirror_direction(direction, hit.surface.geometric_normal);
             if self.plan.color {
                 let mut radiance = value(&batch.emission, row, Vec3::ZERO);
@@ -229,6 +269,13 @@ impl TileTracer<'_> {
             if plan.reflects || plan.refracts {
                 bounces = bsdf.bounces(direction, hit.surface.geometric_normal);
                 eta = bsdf.eta();
+                if let Some(Crossing { mut behind, enters, .. }) = crossing {
+                    if enters && let Some(body) = self.body(hit, &bsdf) {
+                        behind.enter(body);
+                    }
+                    media = run.media.len() as u32;
+                    run.media.push(behind.settled());
+                }
             }
         }
 
@@ -244,7 +291,9 @@ impl TileTracer<'_> {
         if node.reflections < self.plan.reflection_depth {
             let weight = bounces.reflection * opacity;
             let kind = PathKind::Reflection;
-            self.send(hit, &node, Departure { kind, direction: mirrored, weight, alpha_weight: 0.0, eta: 1.0 }, run);
+            let media = hit.ray.media;
+            let mirrored = Departure { kind, direction: mirrored, weight, alpha_weight: 0.0, eta: 1.0, media };
+            self.send(hit, &node, mirrored, run);
         }
         if node.refractions < self.plan.refraction_depth {
             let direction = if straight { direction } else { bounces.refracted };
@@ -252,7 +301,55 @@ impl TileTracer<'_> {
             let weight = refraction + through;
             let eta = if straight { 1.0 } else { eta };
             let kind = PathKind::Refraction;
-            self.send(hit, &node, Departure { kind, direction, weight, alpha_weight, eta }, run);
+            self.send(hit, &node, Departure { kind, direction, weight, alpha_weight, eta, media }, run);
+        }
+    }
+
+    /// Where a ray goes on if the surface that it met is not there: because it is invisible, or because of other bodies.
+    fn passes(
+        &self,
+        hit: &WaveHit,
+        outputs: Outputs<'_>,
+        opacity: f32,
+        crossing: Option<&Crossing>,
+        run: &mut Run,
+    ) -> Option<WaveRay> {
+        let stays = WaveRay { passed: hit.ray.passed + 1, counted: hit.ray.counted + 1, ..hit.ray };
+        let Some(&Crossing { pass, mut behind, enters, last }) = crossing else {
+            return (opacity == 0.0).then(|| hit.ray.going_on(&hit.hit, hit.ray.media as usize));
+        };
+        let media = run.media.len();
+        if opacity == 0.0 {
+            if enters {
+                return Some(stays);
+            }
+            if matches!(pass, Pass::Thin | Pass::Stops) {
+                return Some(hit.ray.going_on(&hit.hit, hit.ray.media as usize));
+            }
+            run.media.push(behind.settled());
+            return Some(hit.ray.going_on(&last, media));
+        }
+        if !matches!(pass, Pass::Touches | Pass::Silent | Pass::Counted) {
+            return None;
+        }
+        let body = self.body(hit, &self.bsdf(hit, outputs, 1.0));
+        if let Some(body) = body {
+            behind.enter(body);
+        }
+        match (pass, body) {
+            (Pass::Counted, _) => {
+                run.media.push(behind);
+                Some(WaveRay { media: media as u32, ..stays })
+            }
+            (Pass::Touches, Some(body)) if body.ior == behind.index => {
+                run.media.push(behind.settled());
+                Some(hit.ray.going_on(&last, media))
+            }
+            (Pass::Silent, Some(_)) => {
+                run.media.push(behind);
+                Some(hit.ray.going_on(&last, media))
+            }
+            _ => None,
         }
     }
 
@@ -289,7 +386,8 @@ impl TileTracer<'_> {
         }
     }
 
-    fn bsdf(&self, hit: &WaveHit, Outputs { batch, row }: Outputs<'_>) -> Bsdf {
+    /// How a surface scatters light; `surrounding` is the index of refraction where its body is not.
+    pub(super) fn bsdf(&self, hit: &WaveHit, Outputs { batch, row }: Outputs<'_>, surrounding: f32) -> Bsdf {
         let surface = &hit.surface;
         let normal = value(&batch.normal, row, None)
             .and_then(Vec3::try_normalize)
@@ -305,20 +403,22 @@ impl TileTracer<'_> {
             normal,
             occlusion: value(&batch.occlusion, row, 1.0),
             outside: surface.front,
+            surrounding,
         }
         .checked()
     }
 
     /// Sends a ray on from a hit, unless it could not be seen.
     fn send(&self, hit: &WaveHit, parent: &TreeNode, departure: Departure, run: &mut Run) {
-        let Departure { kind, direction, weight, alpha_weight, eta } = departure;
+        let Departure { kind, direction, weight, alpha_weight, eta, media } = departure;
         let throughput = Vec3::from(parent.attributes.throughput) * weight;
         if !throughput.is_finite() || throughput.max_element() < LEAST_THROUGHPUT {
             return;
         }
         let reflected = kind == PathKind::Reflection;
         let origin = hit.surface.leave(direction);
-        run.next.push(WaveRay { origin, direction, node: run.nodes.len() as u32, after: None, passed: 0 });
+        let node = run.nodes.len() as u32;
+        run.next.push(WaveRay { origin, direction, node, after: None, passed: 0, media, counted: 0 });
         run.nodes.push(TreeNode {
             parent: Some(hit.ray.node),
             path: if reflected { parent.path.reflected() } else { parent.path.refracted() },
@@ -363,4 +463,6 @@ struct Departure {
     alpha_weight: f32,
     /// Of a refracted ray: the index on its side over the index behind.
     eta: f32,
+    /// The media that it is in.
+    media: u32,
 }

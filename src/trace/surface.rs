@@ -5,6 +5,9 @@ use super::triangle::Ray;
 use super::world::{Hit, PlacedObject, World};
 use crate::math::{Vec2, Vec3, Vec4};
 
+/// Square of the sine between the sides of a triangle up to which single precision is not enough for its normal.
+const SLIVER: f32 = 1e-6;
+
 /// The surface at a hit. Positions are relative to the camera's position, directions are in world space.
 #[derive(Clone, Copy, Debug)]
 pub struct Surface {
@@ -43,7 +46,7 @@ impl Surface {
             apply_abs(local_error) * (1.0 + gamma(3)) + (apply_abs(local) + object.translation.abs()) * gamma(4);
 
         let flip = if hit.front { 1.0 } else { -1.0 };
-        let geometric_normal = (object.normal_from_object * (b - a).cross(c - a)).try_normalize();
+        let geometric_normal = triangle_normal(object, [a, b, c]);
         // Too thin to have a normal in single precision: any normal towards the ray will do.
         let geometric_normal = geometric_normal.map_or_else(|| -ray.direction.normalize_or_zero(), |n| n * flip);
         let normal = shading_normal(object, corners, barycentric)
@@ -71,6 +74,21 @@ impl Surface {
     }
 }
 
+/// Unit normal of a triangle in the world; `None` if it has none even in double precision.
+fn triangle_normal(object: &PlacedObject, [a, b, c]: [Vec3; 3]) -> Option<Vec3> {
+    let (along, across) = (b - a, c - a);
+    let local = along.cross(across);
+    let world = object.normal_from_object * local;
+    // The squares of tiny and huge normals vanish and overflow, and those of slivers are differences of almost equal products.
+    let sound = local.length_squared() > along.length_squared() * across.length_squared() * SLIVER
+        && (1e-30..1e30).contains(&world.length_squared());
+    if sound {
+        return world.try_normalize();
+    }
+    let [a, b, c] = [a, b, c].map(Vec3::as_dvec3);
+    (object.normal_from_object.as_dmat3() * (b - a).cross(c - a)).try_normalize().map(|normal| normal.as_vec3())
+}
+
 fn shading_normal(object: &PlacedObject, corners: [u32; 3], weights: Vec3) -> Option<Vec3> {
     let normals = &object.mesh.normals;
     if normals.is_empty() {
@@ -78,7 +96,11 @@ fn shading_normal(object: &PlacedObject, corners: [u32; 3], weights: Vec3) -> Op
     }
     let [a, b, c] = corners.map(|vertex| normals[vertex as usize]);
     let local = a * weights.x + b * weights.y + c * weights.z;
-    (object.normal_from_object * local).try_normalize()
+    let world = object.normal_from_object * local;
+    if (1e-30..1e30).contains(&world.length_squared()) {
+        return world.try_normalize();
+    }
+    (object.normal_from_object.as_dmat3() * local.as_dvec3()).try_normalize().map(|normal| normal.as_vec3())
 }
 
 /// Vertex attributes at a hit; each is worked out only when asked for.
@@ -167,7 +189,11 @@ impl Surface {
         let d1 = e2.cross(normal) / area_squared;
         let d2 = normal.cross(e1) / area_squared;
         let curvature = 0.5 * (d1.dot(nb - na) + d2.dot(nc - na));
-        if self.front { curvature } else { -curvature }
+        match curvature.is_finite() {
+            true if self.front => curvature,
+            true => -curvature,
+            false => 0.0,
+        }
     }
 }
 

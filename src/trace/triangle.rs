@@ -8,6 +8,15 @@
 use super::gamma;
 use crate::math::Vec3;
 
+/// Roundings on a ray's way into an object's space, with those of the matrix and of where it left a surface.
+const START_ROUNDINGS: u32 = 12;
+
+/// Bound on the error of a position and of one beside it, over the largest coordinate: `Surface::new` has two times 14 roundings
+/// in each of three axes.
+const SLACK: f32 = 2.0 * gamma(84);
+/// Largest slack over the distance: that of rays along a surface has no bound.
+pub(super) const MOST_SLACK: f32 = 1.0 / 16.0;
+
 /// A vertex that is not farther ahead of a ray than this, times the farthest of its triangle, may be behind it.
 pub(super) const NOT_AHEAD: f32 = gamma(8);
 
@@ -20,6 +29,9 @@ pub struct Ray {
     pub direction: Vec3,
     /// 1 / direction, with zeros replaced by values too small to matter (see [`Ray::new`]).
     pub(super) inverse: Vec3,
+    /// Coordinates that were rounded when it was placed, in each axis: [`super::world::PlacedObject`] sets it. The precision of
+    /// `origin` is that of the larger one of both.
+    pub(super) grain: Vec3,
     /// Axes of the sheared space, the ray's own last.
     pub(super) axes: [usize; 3],
     pub(super) shear: Vec3,
@@ -36,6 +48,8 @@ pub struct TriangleHit {
     pub v: f32,
     /// Whether the ray met the side from which the vertices run counter-clockwise.
     pub front: bool,
+    /// How much farther along the ray others may be that lie in one plane with it, for all that single precision can tell.
+    pub slack: f32,
 }
 
 impl Ray {
@@ -61,7 +75,7 @@ impl Ray {
         // strays less than a unit in the last place over any distance a float can hold beside its origin.
         let safe = |d: f32| 1.0 / if d.abs() < 1e-30 { 1e-30_f32.copysign(d) } else { d };
         let inverse = Vec3::new(safe(direction.x), safe(direction.y), safe(direction.z));
-        Self { origin, direction, inverse, axes: [x, y, z], shear }
+        Self { origin, direction, inverse, grain: Vec3::ZERO, axes: [x, y, z], shear }
     }
 
     /// Whether it can meet anything.
@@ -78,7 +92,7 @@ impl Ray {
     }
 
     /// Where the ray meets a triangle at 0 < t ≤ `t_max`. Triangles without area, and those with a coordinate that is
-    /// not finite, are never met.
+    /// not finite, are never met; nor is one on which the ray starts, as far as `grain` can tell.
     #[inline]
     #[must_use]
     pub fn triangle(&self, vertices: &[Vec3; 3], t_max: f32) -> Option<TriangleHit> {
@@ -105,37 +119,60 @@ impl Ray {
         }
         let determinant = u + v + w;
         let [az, bz, cz] = [a[kz], b[kz], c[kz]].map(|z| self.shear.z * z);
-        let t = (u * az + v * bz + w * cz) / determinant;
+        let mut t = (u * az + v * bz + w * cz) / determinant;
+        // `t` lies between the vertices' distances. Where one of these is not ahead of the ray, `t` may be rounding
+        // alone: the ray may leave this very triangle, a hair off it.
+        if az.min(bz).min(cz) <= NOT_AHEAD * az.abs().max(bz.abs()).max(cz.abs()) {
+            t = self.distance_to_plane(vertices)?;
+        }
 
         // Written so that NaN (no area, or a coordinate that is not finite) is no hit.
-        if t > 0.0 && t <= t_max {
-            // `t` lies between the vertices' distances. Where one of these is not ahead of the ray, `t` may be rounding
-            // alone: the ray may leave this very triangle, a hair off it.
-            let largest = |a: f32, b: f32, c: f32| a.abs().max(b.abs()).max(c.abs());
-            let z = largest(az, bz, cz);
-            if az.min(bz).min(cz) <= NOT_AHEAD * z {
-                let edges = [largest(ax, bx, cx), largest(ay, by, cy), largest(u, v, w)];
-                if t <= distance_error(edges, z) / determinant.abs() {
-                    return None;
-                }
-            }
+        if t > 0.0 && t <= t_max && determinant.abs() > 0.0 {
             let front = determinant > 0.0;
-            Some(TriangleHit { t, u: v / determinant, v: w / determinant, front })
+            let slack = self.slack(vertices, t);
+            Some(TriangleHit { t, u: v / determinant, v: w / determinant, front, slack })
         } else {
             None
         }
     }
+
+    /// [`TriangleHit::slack`]: well above the error bounds of [`super::surface::Surface`], divided by the cosine at which the
+    /// ray arrives.
+    #[inline(always)]
+    pub(super) fn slack(&self, vertices: &[Vec3; 3], t: f32) -> f32 {
+        let size = self.origin.abs().max(self.grain).max_element();
+        let (normal, size) = normal_and_size(vertices, size);
+        // The minimum of NaN and a number is the number.
+        (size / normal.dot(self.direction).abs()).min(t * MOST_SLACK)
+    }
+
+    /// The distance to a triangle's plane, in double precision; `None` if the ray may start on it.
+    ///
+    /// The bound on rounding in single precision (pbrt 4th edition, section 6.8.7) cannot decide this: it grows with the distance
+    /// of the vertices, and rejects all that is met by rays along a large plane. But the vertices are exact by definition,
+    /// double precision is as good as exact, and the one thing that was rounded is where the ray starts.
+    #[cold]
+    fn distance_to_plane(&self, vertices: &[Vec3; 3]) -> Option<f32> {
+        let [a, b, c] = vertices.map(|vertex| vertex.as_dvec3());
+        let origin = self.origin.as_dvec3();
+        let normal = (b - a).cross(c - a);
+        // From the nearest vertex, so that least is lost.
+        let offset = [a, b, c].map(|vertex| vertex - origin);
+        let nearest = offset.into_iter().min_by(|a, b| a.length_squared().total_cmp(&b.length_squared()))?;
+        let height = normal.dot(nearest);
+        let start_error = self.origin.abs().max(self.grain).as_dvec3() * f64::from(gamma(START_ROUNDINGS));
+        // Written so that NaN is no hit.
+        (height.abs() > normal.abs().dot(start_error)).then(|| (height / normal.dot(self.direction.as_dvec3())) as f32)
+    }
 }
 
-/// Bound on the rounding error of a hit's distance, times the determinant (pbrt 4th edition, section 6.8.7): from the
-/// largest sheared coordinates, edge function and distance of the vertices.
-///
-/// Near triangles that are seen edge-on this bound is large. That is why it decides only where a ray may start on the
-/// triangle; to reject by it alone would open gaps along outlines.
-#[cold]
-fn distance_error([x, y, edge]: [f32; 3], z: f32) -> f32 {
-    let edge_error = 2.0 * (gamma(2) * x * y + gamma(5) * (y + z) * x + gamma(5) * (x + z) * y);
-    3.0 * (2.0 * gamma(3) * edge * z + edge_error * z)
+/// A triangle's normal, and what the slack of a hit is when divided by its product with the ray's direction. `size` is that of
+/// coordinates that were rounded.
+#[inline(always)]
+pub(super) fn normal_and_size([a, b, c]: &[Vec3; 3], size: f32) -> (Vec3, f32) {
+    let normal = (b - a).cross(c - a);
+    let size = a.abs().max(b.abs()).max(c.abs()).max_element().max(size);
+    (normal, SLACK * size * (normal.x.abs() + normal.y.abs() + normal.z.abs()))
 }
 
 #[cfg(test)]
@@ -149,7 +186,8 @@ mod tests {
         for (from, front) in [(1.0, true), (-1.0, false)] {
             let ray = Ray::new(Vec3::new(0.25, 0.5, from), Vec3::new(0.0, 0.0, -from));
             let hit = ray.triangle(&TRIANGLE, f32::INFINITY).expect("the ray goes through the triangle");
-            assert_eq!(hit, TriangleHit { t: 1.0, u: 0.25, v: 0.5, front });
+            assert_eq!((hit.t, hit.u, hit.v, hit.front), (1.0, 0.25, 0.5, front));
+            assert!((1e-6..1e-4).contains(&hit.slack), "{}", hit.slack);
         }
     }
 

@@ -28,16 +28,18 @@ pub struct Hit {
     /// Whether the front of the triangle was met. The side that is the front in the mesh's own space stays it under
     /// mirroring transforms, as glTF has it.
     pub front: bool,
+    /// Whether the ray meets other surfaces at the same place.
+    pub crowded: bool,
 }
 
-/// Where a hit stands among all hits of its ray: by distance, then by the lower object, then by the lower triangle.
-pub type HitRank = (f32, ObjectId, u32);
+/// One triangle of one object: a ray meets it once at most.
+pub type Facet = (ObjectId, u32);
 
 impl Hit {
-    /// Its place among the hits of its ray.
+    /// The triangle.
     #[must_use]
-    pub fn rank(&self) -> HitRank {
-        (self.t, self.object, self.triangle)
+    pub fn facet(&self) -> Facet {
+        (self.object, self.triangle)
     }
 }
 
@@ -56,6 +58,8 @@ pub struct PlacedObject {
     /// Inverse transpose of the linear part, for normals.
     pub normal_from_object: Mat3,
     pub(super) visible_to: RayKinds,
+    /// By slot: which of coplanar surfaces is seen.
+    pub(super) priorities: Vec<i32>,
     pub(super) tree: Arc<MeshTree>,
     /// By slot: whether the back side is invisible to camera, reflection and refraction rays.
     pub(super) single_sided: Vec<bool>,
@@ -69,8 +73,17 @@ impl PlacedObject {
         self.mesh.slots.get(triangle as usize).map_or(0, |slot| usize::from(*slot))
     }
 
-    fn to_object(&self, ray: &Ray) -> Ray {
-        Ray::new(self.object_from_world * (ray.origin - self.translation), self.object_from_world * ray.direction)
+    pub(super) fn to_object(&self, ray: &Ray) -> Ray {
+        let origin = self.object_from_world * (ray.origin - self.translation);
+        Ray { grain: self.grain(ray.origin), ..Ray::new(origin, self.object_from_world * ray.direction) }
+    }
+
+    /// The grain, in the object's space, of a ray that starts at `origin`.
+    #[inline]
+    pub(super) fn grain(&self, origin: Vec3) -> Vec3 {
+        let m = self.object_from_world;
+        let rounded = origin.abs() + self.translation.abs();
+        m.x_axis.abs() * rounded.x + m.y_axis.abs() * rounded.y + m.z_axis.abs() * rounded.z
     }
 }
 
@@ -93,8 +106,23 @@ impl World {
     /// even if they are single-sided, or a glass body would have no far side.
     #[must_use]
     pub fn new(scene: &Scene, transmissive: &[bool]) -> Self {
+        Self::with_trees_of(scene, transmissive, None)
+    }
+
+    /// The same with the hierarchies of those meshes that an older world has, too.
+    #[must_use]
+    pub fn with_trees_of(scene: &Scene, transmissive: &[bool], older: Option<&Self>) -> Self {
         let origin = scene.camera().position;
-        let trees: Vec<Arc<MeshTree>> = scene.meshes().par_iter().map(|mesh| Arc::new(MeshTree::new(mesh))).collect();
+        let mut known: Vec<(&Arc<Mesh>, &Arc<MeshTree>)> =
+            older.iter().flat_map(|older| &older.objects).map(|object| (&object.mesh, &object.tree)).collect();
+        known.sort_by_key(|(_, tree)| Arc::as_ptr(tree));
+        known.dedup_by_key(|(_, tree)| Arc::as_ptr(tree));
+        let tree_of = |mesh: &Arc<Mesh>| {
+            let same = |known: &Arc<Mesh>| Arc::ptr_eq(known, mesh) || **known == **mesh;
+            let known = known.iter().find(|(known, _)| same(known));
+            known.map_or_else(|| Arc::new(MeshTree::new(mesh)), |(_, tree)| Arc::clone(tree))
+        };
+        let trees: Vec<Arc<MeshTree>> = scene.meshes().par_iter().map(tree_of).collect();
         let objects: Vec<PlacedObject> = scene
             .objects()
             .iter()
@@ -109,6 +137,11 @@ impl World {
                     object_from_world: inverse.as_mat3(),
                     normal_from_object: inverse.transpose().as_mat3(),
                     visible_to: object.visible_to,
+                    priorities: object
+                        .materials
+                        .iter()
+                        .map(|id| object.priority.or(scene.materials()[id.index()].priority).unwrap_or(0))
+                        .collect(),
                     tree: Arc::clone(&trees[object.mesh.index()]),
                     single_sided: object
                         .materials
@@ -153,71 +186,6 @@ impl World {
         object.materials[object.slot(hit.triangle)]
     }
 
-    /// The closest hit of a ray of one kind within `t_max`. Of hits at exactly the same distance, the one with the
-    /// lowest object id and then the lowest triangle counts.
-    #[must_use]
-    pub fn closest(&self, ray: &Ray, kind: RayKinds, t_max: f32) -> Option<Hit> {
-        self.next_hit(ray, kind, t_max, None)
-    }
-
-    /// The first hit of a ray of one kind within `t_max` behind the one of rank `after`: the hit that the ray would
-    /// have if all up to there were absent, bit for bit, and be it at the same distance.
-    #[must_use]
-    pub fn next_hit(&self, ray: &Ray, kind: RayKinds, t_max: f32, after: Option<HitRank>) -> Option<Hit> {
-        let mut best: Option<Hit> = None;
-        self.each_hit(ray, kind, t_max, |hit, t_max| {
-            let rank = hit.rank();
-            let behind = after.is_none_or(|after| rank > after);
-            if behind && best.is_none_or(|best| rank < best.rank()) {
-                *t_max = hit.t;
-                best = Some(hit);
-            }
-            true
-        });
-        best
-    }
-
-    /// The first hits of a ray of one kind, front to back, in one traversal: at most `most`, of those that are `same` (an
-    /// equivalence) only the first, none up to the one of rank `after`, and none that is `absent`. The first of
-    /// them is that of [`Self::next_hit`], bit for bit.
-    ///
-    /// Instead of looking for one hit after the other (Wald et al. 2018), the nearest are kept sorted while the hierarchy is
-    /// traversed once, and the last of them is the far end of the ray: no hit is lost or doubled at equal depth, since
-    /// ranks settle all ties, and nothing is traversed twice.
-    pub fn first_hits(
-        &self,
-        ray: &Ray,
-        kind: RayKinds,
-        (after, absent): (Option<HitRank>, &[HitRank]),
-        most: usize,
-        same: impl Fn(&Hit, &Hit) -> bool,
-        hits: &mut Vec<Hit>,
-    ) {
-        hits.clear();
-        self.each_hit(ray, kind, f32::INFINITY, |hit, t_max| {
-            let rank = hit.rank();
-            if after.is_some_and(|after| rank <= after) || absent.contains(&rank) {
-                return true;
-            }
-            match hits.iter().position(|known| same(known, &hit)) {
-                Some(known) if rank < hits[known].rank() => {
-                    hits.remove(known);
-                }
-                Some(_) => return true,
-                None => {}
-            }
-            let place = hits.partition_point(|known| known.rank() < rank);
-            if place < most {
-                hits.truncate(most - 1);
-                hits.insert(place, hit);
-                if hits.len() == most {
-                    *t_max = hits[most - 1].t;
-                }
-            }
-            true
-        });
-    }
-
     /// Looks for something that blocks a shadow ray within `t_max`. `opaque` tells of a material whether it surely
     /// blocks; hits on others are collected in `passed`, nearest first. Returns whether the ray is surely blocked
     /// (`passed` is then incomplete).
@@ -225,7 +193,7 @@ impl World {
     pub fn blocked(&self, ray: &Ray, t_max: f32, opaque: impl Fn(MaterialId) -> bool, passed: &mut Vec<Hit>) -> bool {
         passed.clear();
         let mut blocked = false;
-        self.each_hit(ray, RayKinds::SHADOW, t_max, |hit, _| {
+        self.each_hit(ray, RayKinds::SHADOW, t_max, |hit, _, _| {
             blocked = opaque(self.material(&hit));
             if !blocked {
                 passed.push(hit);
@@ -238,9 +206,16 @@ impl World {
         blocked
     }
 
-    /// Shows each hit to `accept`, roughly front to back; it may lower `t_max` and returns whether to go on.
+    /// Shows each hit to `accept`, roughly front to back, with how much farther others may be at its place; `accept` may lower
+    /// `t_max` and returns whether to go on.
     #[inline]
-    fn each_hit(&self, ray: &Ray, kind: RayKinds, t_max: f32, mut accept: impl FnMut(Hit, &mut f32) -> bool) {
+    pub(super) fn each_hit(
+        &self,
+        ray: &Ray,
+        kind: RayKinds,
+        t_max: f32,
+        mut accept: impl FnMut(Hit, f32, &mut f32) -> bool,
+    ) {
         let culls = kind != RayKinds::SHADOW;
         let mut t_max = t_max;
         self.tree.traverse(ray, &mut t_max, |leaf, t_max| {
@@ -254,14 +229,16 @@ impl World {
                     if culls && !hit.front && object.single_sided[object.slot(triangle)] {
                         return true;
                     }
+                    let slack = hit.slack;
                     let hit = Hit {
                         t: hit.t.max(leaf.near),
                         object: ObjectId(*id),
                         triangle,
                         barycentric: [hit.u, hit.v],
                         front: hit.front,
+                        crowded: false,
                     };
-                    go_on = accept(hit, t_max);
+                    go_on = accept(hit, slack, t_max);
                     go_on
                 });
                 if !go_on {

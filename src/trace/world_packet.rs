@@ -1,25 +1,17 @@
-//! Packets of rays through the world. What they find is what [`World::closest`] and [`World::blocked`] find of each ray, bit
-//! for bit.
+//! Packets of rays through the world. What they find is what [`World::closest`] finds of each ray, bit for bit.
+//!
+//! Shadow rays do not go in packets: those stop later than single rays, which end at the first thing they meet, and were
+//! measured three times as slow (`tests/bench/README.md`).
 
 use super::packet::{self, DONE, LANES, LaneHits, LaneRays, Lanes, RayStart, Visit, intersect, largest};
 use super::triangle::Ray;
 use super::world::{Hit, PlacedObject, World};
-use crate::scene::ids::{MaterialId, ObjectId};
+use crate::math::Vec3;
+use crate::scene::ids::ObjectId;
 use crate::scene::settings::RayKinds;
 
 /// Fewer rays are traced one by one.
 const FEWEST: usize = 4;
-
-/// What a packet knows of the way of one of its rays.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Way {
-    /// Nothing is on it.
-    Clear,
-    /// Something that surely blocks is on it.
-    Blocked,
-    /// Something is on it that may let pass: ask [`World::blocked`].
-    Unsure,
-}
 
 impl World {
     /// The closest hits of at most [`LANES`] rays of one kind, as [`Self::closest`] finds them one by one. Quickest where the
@@ -33,7 +25,14 @@ impl World {
             self.arch.dispatch(Closest { world: self, rays: &packet, kind, found })
         });
         match traced {
-            Some(found) => hits = std::array::from_fn(|lane| found.hit(lane)),
+            Some(found) => {
+                for (lane, (hit, &(origin, direction))) in hits.iter_mut().zip(rays).enumerate() {
+                    *hit = match found.crowded[lane] {
+                        0 => found.hit(lane),
+                        _ => self.closest(&Ray::new(origin, direction), kind, f32::INFINITY),
+                    };
+                }
+            }
             None => {
                 for (hit, &(origin, direction)) in hits.iter_mut().zip(rays) {
                     *hit = self.closest(&Ray::new(origin, direction), kind, f32::INFINITY);
@@ -42,30 +41,21 @@ impl World {
         }
         hits
     }
-
-    /// Whether something blocks at most [`LANES`] shadow rays within their `reach`. Slower than single rays, which stop at the
-    /// first thing they meet (`tests/bench/README.md`), so the renderer does not use it; the benchmark shows it. `opaque` is as for [`Self::blocked`].
-    #[must_use]
-    pub fn blocked_of(&self, rays: &[RayStart], reach: &[f32], opaque: impl Fn(MaterialId) -> bool) -> [Way; LANES] {
-        let packet = if rays.len() < FEWEST { None } else { LaneRays::of(rays) };
-        let traced = packet.and_then(|packet| {
-            let mut limit = [DONE; LANES];
-            limit[..rays.len()].copy_from_slice(&reach[..rays.len()]);
-            self.arch.dispatch(Blocked { world: self, rays: &packet, reach: limit, opaque })
-        });
-        traced.unwrap_or([Way::Unsure; LANES])
-    }
 }
 
 /// The nearest hits so far; absent ones have the object `u32::MAX`.
 #[derive(Clone, Copy)]
 struct Found {
     t: Lanes,
+    /// The distance up to which others may be at the same place.
+    reach: Lanes,
     u: Lanes,
     v: Lanes,
     object: [u32; LANES],
     triangle: [u32; LANES],
     side: [u32; LANES],
+    /// Whether others may be at the same place.
+    crowded: [u32; LANES],
 }
 
 impl Found {
@@ -75,7 +65,8 @@ impl Found {
         let mut t = [DONE; LANES];
         t[..rays].fill(f32::INFINITY);
         let none = [Self::NONE; LANES];
-        Self { t, u: [0.0; LANES], v: [0.0; LANES], object: none, triangle: none, side: [0; LANES] }
+        let (u, v, side, crowded) = ([0.0; LANES], [0.0; LANES], [0; LANES], [0; LANES]);
+        Self { t, reach: t, u, v, object: none, triangle: none, side, crowded }
     }
 
     #[inline(always)]
@@ -86,6 +77,7 @@ impl Found {
             triangle: self.triangle[lane],
             barycentric: [self.u[lane], self.v[lane]],
             front: self.side[lane] == LaneHits::FRONT,
+            crowded: false,
         })
     }
 
@@ -94,11 +86,16 @@ impl Found {
     #[inline(always)]
     fn take(&mut self, hits: &LaneHits, near: &Lanes, id: u32, triangle: u32, single_sided: bool) {
         let wanted = if single_sided { LaneHits::FRONT } else { LaneHits::FRONT | LaneHits::BACK };
-        let Self { t: best, u, v, object, triangle: known, side } = self;
+        let Self { t: best, reach, u, v, object, triangle: known, side, crowded } = self;
         for i in 0..LANES {
             let t = if hits.t[i] > near[i] { hits.t[i] } else { near[i] };
             let lower = (id < object[i]) | ((id == object[i]) & (triangle < known[i]));
-            let better = (hits.side[i] & wanted != 0) & ((t < best[i]) | ((t == best[i]) & lower));
+            let met = hits.side[i] & wanted != 0;
+            let better = met & ((t < best[i]) | ((t == best[i]) & lower));
+            let here = t + hits.slack[i];
+            let beside = if better { best[i] <= here } else { met & (t <= reach[i]) };
+            crowded[i] = u32::from(beside | (!better & (crowded[i] != 0)));
+            reach[i] = if better { here } else { reach[i] };
             best[i] = if better { t } else { best[i] };
             u[i] = if better { hits.u[i] } else { u[i] };
             v[i] = if better { hits.v[i] } else { v[i] };
@@ -140,6 +137,12 @@ fn each_object<F>(
     Some(())
 }
 
+/// The largest component of any ray's origin.
+#[inline(always)]
+fn largest_start(rays: &LaneRays) -> f32 {
+    rays.origin.iter().flatten().fold(0.0, |largest, lane| if lane.abs() > largest { lane.abs() } else { largest })
+}
+
 struct Closest<'a> {
     world: &'a World,
     rays: &'a LaneRays,
@@ -152,6 +155,8 @@ struct InObject<'a> {
     found: &'a mut Found,
     id: u32,
     object: &'a PlacedObject,
+    rays: &'a LaneRays,
+    size: f32,
     culls: bool,
     near: &'a Lanes,
     reach: Lanes,
@@ -163,11 +168,21 @@ impl Visit for InObject<'_> {
         &self.reach
     }
 
+    #[inline]
+    fn grain(&self, lane: usize) -> Vec3 {
+        self.object.grain(self.rays.start(lane))
+    }
+
+    #[inline(always)]
+    fn size(&self) -> f32 {
+        self.size
+    }
+
     #[inline(always)]
     fn hit(&mut self, triangle: u32, hits: &LaneHits) {
         let single_sided = self.culls && self.object.single_sided[self.object.slot(triangle)];
         self.found.take(hits, self.near, self.id, triangle, single_sided);
-        for (reach, best) in self.reach.iter_mut().zip(&self.found.t) {
+        for (reach, best) in self.reach.iter_mut().zip(&self.found.reach) {
             *reach = if *best < *reach { *best } else { *reach };
         }
     }
@@ -180,14 +195,16 @@ impl pulp::WithSimd for Closest<'_> {
     fn with_simd<S: pulp::Simd>(self, _: S) -> Self::Output {
         let Self { world, rays, kind, mut found } = self;
         let culls = kind != RayKinds::SHADOW;
+        let farthest = largest_start(rays);
         each_object(
             world,
             rays,
             kind,
             &mut found,
-            |found| &found.t,
+            |found| &found.reach,
             |found, id, object, placed, near, limit| {
-                let mut search = InObject { found, id, object, culls, near, reach: limit };
+                let size = largest_start(placed).max(object.grain(Vec3::splat(farthest)).max_element());
+                let mut search = InObject { found, id, object, rays, size, culls, near, reach: limit };
                 match placed.shear() {
                     Some(shear) => intersect(&object.tree, placed, &shear, &mut search),
                     None => packet::one_by_one(&object.tree, placed, &mut search),
@@ -195,72 +212,5 @@ impl pulp::WithSimd for Closest<'_> {
             },
         )?;
         Some(found)
-    }
-}
-
-struct Blocked<'a, F> {
-    world: &'a World,
-    rays: &'a LaneRays,
-    reach: Lanes,
-    opaque: F,
-}
-
-/// What is known of the ways of a packet.
-struct Ways {
-    way: [Way; LANES],
-    reach: Lanes,
-}
-
-/// Looks for anything in the way in one object.
-struct InTheWay<'a, F> {
-    ways: &'a mut Ways,
-    object: &'a PlacedObject,
-    reach: Lanes,
-    opaque: &'a F,
-}
-
-impl<F: Fn(MaterialId) -> bool> Visit for InTheWay<'_, F> {
-    #[inline(always)]
-    fn reach(&self) -> &Lanes {
-        &self.reach
-    }
-
-    #[inline(always)]
-    fn hit(&mut self, triangle: u32, hits: &LaneHits) {
-        let opaque = (self.opaque)(self.object.materials[self.object.slot(triangle)]);
-        let found = if opaque { Way::Blocked } else { Way::Unsure };
-        for i in 0..LANES {
-            if hits.side[i] != LaneHits::NONE {
-                self.ways.way[i] = found;
-                self.ways.reach[i] = DONE;
-                self.reach[i] = DONE;
-            }
-        }
-    }
-}
-
-impl<F: Fn(MaterialId) -> bool> pulp::WithSimd for Blocked<'_, F> {
-    type Output = Option<[Way; LANES]>;
-
-    #[inline(always)]
-    fn with_simd<S: pulp::Simd>(self, _: S) -> Self::Output {
-        let Self { world, rays, reach, opaque } = self;
-        let mut ways = Ways { way: [Way::Clear; LANES], reach };
-        let kind = RayKinds::SHADOW;
-        each_object(
-            world,
-            rays,
-            kind,
-            &mut ways,
-            |ways| &ways.reach,
-            |ways, _, object, placed, _, limit| {
-                let mut search = InTheWay { ways, object, reach: limit, opaque: &opaque };
-                match placed.shear() {
-                    Some(shear) => intersect(&object.tree, placed, &shear, &mut search),
-                    None => packet::one_by_one(&object.tree, placed, &mut search),
-                }
-            },
-        )?;
-        Some(ways.way)
     }
 }

@@ -284,6 +284,7 @@ fn scene(name: &str) -> Scene {
         script,
         params,
         priority: None,
+        dielectric_priority: 0,
         double_sided: true,
         lines: Default::default(),
         span: None,

@@ -18,10 +18,10 @@ use tusche::files::FileStore;
 use tusche::math::Vec3;
 use tusche::scene::settings::RayKinds;
 use tusche::scene::{Scene, file};
+use tusche::trace::World;
 use tusche::trace::packet::{LANES, RayStart};
 use tusche::trace::surface::Surface;
 use tusche::trace::triangle::Ray;
-use tusche::trace::{Way, World};
 
 const SIZE: [u32; 2] = [1280, 720];
 /// Side of the blocks of pixels in which rays are ordered.
@@ -103,20 +103,24 @@ fn measure(name: &str, scene: &Scene) {
 
     for threads in [1, std::thread::available_parallelism().map_or(1, usize::from)] {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads can be started");
-        let line = |kind: &str, rays: &[RayStart], single: Trace, packets: Trace| {
+        let line = |kind: &str, rays: &[RayStart], single: Trace, packets: Option<Trace>| {
             let mut rates = [const { Vec::new() }; 3];
             for _ in 0..PASSES {
-                let [single, packets] = [single, packets].map(|trace| rate(&pool, rays, &|rays| trace(&world, rays)));
+                let single = rate(&pool, rays, &|rays| single(&world, rays));
+                let packets = packets.map_or(f64::NAN, |packets| rate(&pool, rays, &|rays| packets(&world, rays)));
                 for (rates, rate) in rates.iter_mut().zip([single, packets, packets / single]) {
                     rates.push(rate);
                 }
             }
             let [single, packets, ratio] = rates.map(median);
-            println!("| {name} | {kind} | {threads} | {single:.2} | {packets:.2} | {ratio:.2} |");
+            match packets.is_nan() {
+                true => println!("| {name} | {kind} | {threads} | {single:.2} | | |"),
+                false => println!("| {name} | {kind} | {threads} | {single:.2} | {packets:.2} | {ratio:.2} |"),
+            }
         };
-        line("camera", &camera, closest, closest_of);
-        line("shadow", &shadow, blocked, blocked_of);
-        line("bounce", &bounce, closest, closest_of);
+        line("camera", &camera, closest, Some(closest_of));
+        line("shadow", &shadow, blocked, None);
+        line("bounce", &bounce, closest, Some(closest_of));
     }
     println!(
         "\n{name}: {} triangles, trees of {:.1} MB in {wall:.2} s ({cpu:.2} s of CPU time), {} of {} camera rays hit\n",
@@ -178,22 +182,6 @@ fn blocked(world: &World, rays: &[RayStart]) -> usize {
         world.blocked(&Ray::new(origin, direction), f32::INFINITY, |_| true, &mut passed)
     };
     rays.iter().filter(|ray| is_blocked(ray)).count()
-}
-
-fn blocked_of(world: &World, rays: &[RayStart]) -> usize {
-    let mut passed = Vec::new();
-    let mut blocked = 0;
-    for rays in rays.chunks(LANES) {
-        let ways = world.blocked_of(rays, &[f32::INFINITY; LANES], |_| true);
-        for (way, &(origin, direction)) in ways.iter().zip(rays) {
-            blocked += usize::from(match way {
-                Way::Clear => false,
-                Way::Blocked => true,
-                Way::Unsure => world.blocked(&Ray::new(origin, direction), f32::INFINITY, |_| true, &mut passed),
-            });
-        }
-    }
-    blocked
 }
 
 /// Millions of rays a second in one pass.

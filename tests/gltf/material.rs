@@ -437,7 +437,7 @@ fn extras_with_faults() {
          nodes[0].extras.tusche.lines: expected true or false\n\
          nodes[0].extras.tusche.priority: expected a whole number from −2147483648 to 2147483647\n\
          materials[0].extras.tusche.shadr: unknown key; did you mean `shader`?\n\
-         materials[0].extras.tusche.lines: unknown key; there are shader, params, priority\n\
+         materials[0].extras.tusche.lines: unknown key; there are shader, params, priority, dielectric_priority\n\
          materials[0].extras.tusche.params: expected a record of parameters\n\
          materials[0].extras.tusche.priority: expected a whole number from −2147483648 to 2147483647\n\
          materials[0].extras.tusche.shader: gone.rhai: cannot read this file: no such file"

@@ -106,6 +106,7 @@ fn materials_and_their_parameters() {
     let scene = loaded(FULL);
     let ink = &scene.materials[0];
     assert_eq!((ink.name.as_str(), ink.priority, ink.double_sided), ("ink", Some(-3), false));
+    assert_eq!(ink.dielectric_priority, 2);
     assert_eq!(scene.scripts[ink.script.index()].path.as_deref(), Some(Path::new("ink.rhai")));
     let value = |name: &str| ink.params[name].0.clone();
     assert_eq!(value("on"), ParamValue::Bool(true));

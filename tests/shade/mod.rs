@@ -49,6 +49,7 @@ pub fn scene_with(scripts: &[&str], params: BTreeMap<String, (ParamValue, Option
             script,
             params: if index + 1 == scripts.len() { params.clone() } else { BTreeMap::new() },
             priority: None,
+            dielectric_priority: 0,
             double_sided: true,
             lines: Default::default(),
             span: None,

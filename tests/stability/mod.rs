@@ -19,14 +19,18 @@ mod scripts;
 mod ties;
 mod transforms;
 mod triangles;
+mod uv;
 
 use std::panic::catch_unwind;
 
 use rayon::prelude::*;
 use tusche::math::Vec3;
 
-use crate::common::Picture;
+use crate::common::{Picture, golden, root};
 use crate::trace::random;
+
+/// Where the table of the last run is kept.
+const TABLE: &str = "tests/golden/stability/table.md";
 
 /// A hard case.
 struct Case {
@@ -88,6 +92,7 @@ fn every_hard_case_stays_within_its_bound() {
         edges::CASES,
         acne::CASES,
         triangles::CASES,
+        uv::CASES,
         transforms::CASES,
         ties::CASES,
         place::CASES,
@@ -118,4 +123,15 @@ fn every_hard_case_stays_within_its_bound() {
     }
     println!("{table}");
     assert!(broken.is_empty(), "out of bounds:\n{}", broken.join("\n"));
+    // The table of a usual run is a golden text.
+    if ["TUSCHE_CASE", "TUSCHE_RAYS", "TUSCHE_SCENES"].iter().all(|name| std::env::var_os(name).is_none()) {
+        golden(&root().join(TABLE), &table);
+    }
+}
+
+#[test]
+fn the_readme_shows_the_table() {
+    let text =
+        |path: &str| std::fs::read_to_string(root().join(path)).unwrap_or_else(|fault| panic!("{path}: {fault}"));
+    assert!(text("README.md").contains(&text(TABLE)), "the table of hard cases in README.md is not that of {TABLE}");
 }

@@ -27,8 +27,8 @@ pub const CASES: &[Case] = &[
     Case {
         name: "scenes of size 1e-4 to 1e6",
         wrong: "lines that depend on the unit of length",
-        unit: "share of values off by more than 0.01 (a known limit)",
-        bound: 5e-2,
+        unit: "share of values off by more than 0.01",
+        bound: 1e-4,
         figure: || {
             [-4, -3, -2, -1, 1, 2, 3, 4, 5, 6].map(|power| resized(10_f64.powi(power))).into_iter().fold(0.0, f64::max)
         },

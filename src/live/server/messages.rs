@@ -11,6 +11,7 @@ use super::super::controls::ControlGroup;
 use super::super::edit::KeyPath;
 use crate::diag::{Diagnostic, Diagnostics, Severity};
 use crate::film::View;
+use crate::live::Redone;
 use crate::sample::PixelRect;
 
 /// All that pages show of a scene but its picture.
@@ -88,6 +89,7 @@ pub(in crate::live) fn picture(shown: &ShownPicture, after: Option<Duration>) ->
             "lines": seconds.lines,
             "film": seconds.film,
         },
+        "redone": redone(&picture.redone),
         "total": seconds.total,
         "threads": stats.threads,
         "rays": stats.rays,
@@ -99,6 +101,27 @@ pub(in crate::live) fn picture(shown: &ShownPicture, after: Option<Duration>) ->
         })).collect::<Vec<_>>(),
     })
     .to_string()
+}
+
+/// What was done again for a picture, and what was known already.
+fn redone(redone: &Redone) -> String {
+    let tiles = |count: usize| match count {
+        0 => "none".to_owned(),
+        all if all == redone.tiles => "all".to_owned(),
+        some => format!("{some} of {} tiles", redone.tiles),
+    };
+    let shaded = (redone.traced + redone.shaded + redone.restyled).min(redone.tiles);
+    let mut text = format!(
+        "done again: rays {}, shading {}, lines {}, pixels {}",
+        tiles(redone.traced),
+        tiles(shaded),
+        tiles(redone.lined),
+        tiles(redone.developed)
+    );
+    if !redone.materials.is_empty() && redone.traced < redone.tiles {
+        text += &format!("; shaders run: {}", redone.materials.join(", "));
+    }
+    text
 }
 
 /// Bytes of whole numbers before the pixels.

@@ -1,6 +1,7 @@
 //! What an exporter may add for Tusche: `extras.tusche` on materials and nodes.
 //!
-//! On a material: `{ "shader": "ink.rhai", "params": { "ink_width": 2.5 }, "priority": 3 }`. On a node, also
+//! On a material: `{ "shader": "ink.rhai", "params": { "ink_width": 2.5 }, "priority": 3,
+//! "dielectric_priority": 1 }`. On a node, also
 //! `"lines": false` and `"group": "car"`; a node's shader replaces all materials of its mesh. What a node says does not reach its children.
 //!
 //! A shader is a path relative to the model, or `builtin:NAME`. Parameters are written as in a scene file: booleans,
@@ -57,6 +58,7 @@ pub(super) struct TextureFile {
 pub(super) struct Extra {
     pub look: Look,
     pub priority: Option<i32>,
+    pub dielectric_priority: i32,
     pub lines: Option<bool>,
     pub group: Option<String>,
 }
@@ -71,10 +73,16 @@ pub(super) enum On {
 impl On {
     fn keys(self) -> &'static [&'static str] {
         match self {
-            Self::Material => &["shader", "params", "priority"],
+            Self::Material => &["shader", "params", "priority", "dielectric_priority"],
             Self::Node => &["shader", "params", "priority", "lines", "group"],
         }
     }
+}
+
+const WHOLE: &str = "expected a whole number from −2147483648 to 2147483647";
+
+fn whole(value: &Value) -> Option<i32> {
+    value.as_i64().and_then(|number| i32::try_from(number).ok())
 }
 
 /// Reads the extras at `place`. What is wrong is reported and left out.
@@ -109,9 +117,13 @@ pub(super) fn read(
                 }
             }
             ("params", _) => report.error(place, "expected a record of parameters"),
-            ("priority", value) => match value.as_i64().and_then(|priority| i32::try_from(priority).ok()) {
+            ("priority", value) => match whole(value) {
                 Some(priority) => extra.priority = Some(priority),
-                None => report.error(place, "expected a whole number from −2147483648 to 2147483647"),
+                None => report.error(place, WHOLE),
+            },
+            ("dielectric_priority", value) if on == On::Material => match whole(value) {
+                Some(priority) => extra.dielectric_priority = priority,
+                None => report.error(place, WHOLE),
             },
             ("lines", value) if on == On::Node => match value.as_bool() {
                 Some(lines) => extra.lines = Some(lines),

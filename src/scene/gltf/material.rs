@@ -31,6 +31,7 @@ pub(super) struct Draft {
     pub script: Script,
     pub params: BTreeMap<String, (ParamValue, Option<Span>)>,
     pub priority: Option<i32>,
+    pub dielectric_priority: i32,
     pub double_sided: bool,
     /// Of the material's extras.
     pub attributes: AttributeSet,
@@ -67,14 +68,18 @@ impl Drafts<'_> {
             params.insert("use_vertex_color".into(), (ParamValue::Bool(true), None));
         }
         let attributes = AttributeSet::new();
-        Some(Draft { name, script: default_script()?, params, priority: None, double_sided: false, attributes })
+        let script = default_script()?;
+        let (priority, dielectric_priority) = (None, 0);
+        Some(Draft { name, script, params, priority, dielectric_priority, double_sided: false, attributes })
     }
 
     /// The draft of a node's shader, which replaces the materials of its mesh. `None` if its extras name none.
     pub fn of_node(&mut self, name: String, look: Look) -> Option<Draft> {
         let script = look.shader?;
         let params = look.params.into_iter().map(|(key, value)| (key, (self.value(value, &name), None))).collect();
-        Some(Draft { name, script, params, priority: None, double_sided: true, attributes: AttributeSet::new() })
+        let attributes = AttributeSet::new();
+        let (priority, dielectric_priority) = (None, 0);
+        Some(Draft { name, script, params, priority, dielectric_priority, double_sided: true, attributes })
     }
 
     /// The draft of `materials[index]`.
@@ -101,7 +106,9 @@ impl Drafts<'_> {
         }
         let script = extra.look.shader.or_else(default_script)?;
         let attributes = extras::attributes(&json.extras);
-        Some(Draft { name, script, params, priority: extra.priority, double_sided: json.double_sided, attributes })
+        let (priority, dielectric_priority) = (extra.priority, extra.dielectric_priority);
+        let double_sided = json.double_sided;
+        Some(Draft { name, script, params, priority, dielectric_priority, double_sided, attributes })
     }
 
     fn value(&mut self, param: Param, material: &str) -> ParamValue {

@@ -198,7 +198,7 @@ impl Walk<'_> {
         let is_skinned = deformation.joints.is_some();
         let model_from_mesh = if is_skinned { DAffine3::IDENTITY } else { self.model_from_nodes[node] };
         let shape = self.shape(node, mesh, deformation);
-        let Extra { look, priority, lines, group } = extra;
+        let Extra { look, priority, lines, group, .. } = extra;
         let group = self.placement.group.clone().or(group);
         let look = look.shader.is_some().then(|| {
             self.looks.push((name.to_owned(), look));
@@ -392,7 +392,7 @@ impl Model {
             .drafts
             .into_iter()
             .map(|draft| {
-                let Draft { name, script, mut params, priority, double_sided, attributes } = draft;
+                let Draft { name, script, mut params, priority, dielectric_priority, double_sided, attributes } = draft;
                 for (value, _) in params.values_mut() {
                     if let ParamValue::Texture(reference) = value {
                         reference.texture = textures[reference.texture.index()];
@@ -400,8 +400,16 @@ impl Model {
                 }
                 let lines = LineOverrides::default();
                 let script = into.add_script(script);
-                let id =
-                    into.add_material(Material { name, script, params, priority, double_sided, lines, span: None });
+                let id = into.add_material(Material {
+                    name,
+                    script,
+                    params,
+                    priority,
+                    dielectric_priority,
+                    double_sided,
+                    lines,
+                    span: None,
+                });
                 if !attributes.is_empty() {
                     into.attributes.materials.insert(id, attributes);
                 }

@@ -104,6 +104,7 @@ fn scene_of(source: &Arc<Source>) -> Result<(Scene, MaterialId), Diagnostics> {
         script,
         params: BTreeMap::new(),
         priority: None,
+        dielectric_priority: 0,
         double_sided: true,
         lines: Default::default(),
         span: None,

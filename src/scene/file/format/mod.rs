@@ -232,6 +232,11 @@ pub(super) struct Material {
     /// Line priority of its surfaces where neither the script nor the object gives one. Default: 0.
     #[schemars(range(min = i32::MIN, max = i32::MAX))]
     pub priority: Option<i32>,
+    /// Which of overlapping bodies of glass or liquid fills the space that they share: the one with the larger number, and of
+    /// equal ones the one that a ray enters last. Says nothing about lines.
+    #[serde(default)]
+    #[schemars(range(min = i32::MIN, max = i32::MAX))]
+    pub dielectric_priority: i32,
     /// Whether surfaces are seen from behind.
     #[serde(default = "yes")]
     pub double_sided: bool,
