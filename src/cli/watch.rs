@@ -149,7 +149,7 @@ impl Talk {
             News::Picture { picture, after: Some(after) } if picture.is_final => {
                 let samples = picture.samples;
                 let s = if samples == 1 { "" } else { "s" };
-                terminal::note(&format!("picture of {samples} sample{s} per pixel, {} after the change", time(after)));
+                terminal::note(&format!("picture of {samples} sample{s} per pixel in {}", time(after)));
             }
             News::Wrote(path) => terminal::note(&format!("wrote {}", path.display())),
             News::Saved(path) => terminal::note(&format!("wrote the page's edits to {}", path.display())),

@@ -77,7 +77,7 @@ pub enum News {
         /// In how many folders.
         folders: usize,
     },
-    /// What is questionable about the scene, if that is other than before.
+    /// What is questionable about the scene or the picture, if that is other than before.
     Warnings(Diagnostics),
     /// The scene cannot be shown; the last good picture stays. Told once for the same faults.
     Faults(Diagnostics),
@@ -267,7 +267,10 @@ struct Driver {
     dropped: u32,
     faults: Diagnostics,
     warnings: Diagnostics,
+    /// What the gate stopped in the last picture, and errors of scripts there; and what was told of both.
+    gated: Diagnostics,
     script_errors: Diagnostics,
+    told: [Diagnostics; 2],
     /// When pages last heard of progress.
     progress: Option<Instant>,
 }
@@ -335,7 +338,9 @@ impl Driver {
             dropped: 0,
             faults: Diagnostics::default(),
             warnings: Diagnostics::default(),
+            gated: Diagnostics::default(),
             script_errors: Diagnostics::default(),
+            told: Default::default(),
             progress: None,
         }
     }
@@ -593,11 +598,19 @@ impl Driver {
                 self.outputs.write(file.clone(), current.settings.clone(), Arc::clone(&picture));
             }
         }
-        if self.script_errors != picture.script_errors {
-            self.script_errors = picture.script_errors.clone();
+        if self.script_errors != picture.script_errors || self.gated != picture.warnings {
+            self.script_errors.clone_from(&picture.script_errors);
+            self.gated.clone_from(&picture.warnings);
             self.post_faults();
-            if self.script_errors.has_errors() {
-                tell(News::ScriptErrors(self.script_errors.clone()));
+        }
+        // Pictures on the way have the same faults at fewer hits.
+        if picture.is_final && self.told != [picture.script_errors.clone(), picture.warnings.clone()] {
+            self.told = [picture.script_errors.clone(), picture.warnings.clone()];
+            if !picture.warnings.is_empty() {
+                tell(News::Warnings(picture.warnings.clone()));
+            }
+            if picture.script_errors.has_errors() {
+                tell(News::ScriptErrors(picture.script_errors.clone()));
             }
         }
         tell(News::Picture { picture, after });
@@ -711,7 +724,7 @@ impl Driver {
 
     fn post_faults(&self) {
         let has_picture = self.session.picture().is_some();
-        let text = messages::faults([&self.faults, &self.script_errors, &self.warnings], has_picture);
+        let text = messages::faults([&self.faults, &self.script_errors, &self.gated, &self.warnings], has_picture);
         self.board.post(Topic::Faults, text);
     }
 }

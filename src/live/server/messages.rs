@@ -45,8 +45,8 @@ pub(in crate::live) fn note(text: &str, is_bad: bool) -> String {
     json!({ "text": text, "bad": is_bad }).to_string()
 }
 
-/// What is wrong: faults of the scene, of scripts while they run, and warnings.
-pub(in crate::live) fn faults(lists: [&Diagnostics; 3], has_picture: bool) -> String {
+/// What is wrong: faults of the scene, of scripts while they run, what the gate stopped, and warnings.
+pub(in crate::live) fn faults(lists: [&Diagnostics; 4], has_picture: bool) -> String {
     let diagnostics: Vec<_> = lists.into_iter().flat_map(|list| &list.0).map(diagnostic).collect();
     // Errors while scripts run do not keep a picture from being made.
     json!({ "stale": lists[0].has_errors() && has_picture, "list": diagnostics }).to_string()
