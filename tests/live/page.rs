@@ -280,6 +280,28 @@ fn requests_have_limits() {
 }
 
 #[test]
+fn clients_that_stall_are_dropped() {
+    let place = place();
+    let watching = watching(&place);
+    watching.picture();
+    let (host, path) = parts(watching.url());
+    let head =
+        format!("POST {path}edit HTTP/1.1\r\nHost: {host}\r\nContent-Type: application/json\r\nContent-Length: 99\r\n");
+    // Nothing, half a head, and half a body; all at once, since each has its ten seconds.
+    let stalled = ["".to_owned(), head.clone(), format!("{head}\r\n{{")].map(|text| {
+        let mut stream = std::net::TcpStream::connect(host).expect("the server takes connections");
+        stream.set_read_timeout(Some(super::LIMIT)).expect("time limits can be set");
+        std::io::Write::write_all(&mut stream, text.as_bytes()).expect("it can be sent");
+        (text, stream)
+    });
+    for (text, mut stream) in stalled {
+        let end = std::io::Read::read_to_end(&mut stream, &mut Vec::new());
+        assert!(end.is_ok(), "the server still waits after {text:?}");
+    }
+    assert_eq!(get(watching.url()).status, 200);
+}
+
+#[test]
 fn ten_thousand_malformed_requests_leave_it_serving() {
     let place = place();
     let watching = watching(&place);
