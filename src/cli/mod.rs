@@ -10,6 +10,7 @@ mod render;
 mod request;
 mod shader;
 mod terminal;
+mod watch;
 mod why;
 
 use std::io::Write;
@@ -56,6 +57,7 @@ pub fn run() -> u8 {
     let result = match arguments.command {
         Command::Render(arguments) => render::run(&arguments),
         Command::Explain(arguments) => explain::run(&arguments),
+        Command::Watch(arguments) => watch::run(&arguments),
         Command::Why(arguments) => why::run(&arguments),
         Command::Flicker(arguments) => flicker::run(&arguments),
         Command::Shader { command } => shader::run(&command),

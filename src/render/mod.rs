@@ -7,6 +7,7 @@
 
 mod files;
 mod grid;
+pub mod request;
 mod scripts;
 pub mod stats;
 mod totals;
@@ -16,7 +17,8 @@ pub(crate) use grid::Grid;
 pub(crate) use scripts::ScriptedLines;
 pub(crate) use totals::Totals;
 
-pub use files::{PictureFile, layers_of, render_files};
+pub use files::{PictureFile, layers_of, render_files, write_picture};
+pub use request::{LoadedScene, SceneRequest};
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
