@@ -11,7 +11,7 @@
 //! 6. [`mod@line`]: image work only; each sample finds the line it sees.
 //! 7. [`film`]: samples are filtered into layers and written as tiles finish.
 //!
-//! [`render`] is the loop over all of it; [`study`] measures what comes of it. Nothing but [`cli`] prints; problems are [`diag::Diagnostic`]s.
+//! [`render`] is the loop over all of it; [`live`] repeats only what an edit touches; [`study`] measures what comes of it. Nothing but [`cli`] prints; problems are [`diag::Diagnostic`]s.
 
 pub mod cli;
 pub mod clock;
@@ -19,6 +19,7 @@ pub mod diag;
 pub mod files;
 pub mod film;
 pub mod line;
+pub mod live;
 pub mod math;
 pub mod plan;
 pub mod render;

@@ -7,9 +7,9 @@ use std::fmt;
 use crate::film::{Filter, Layer};
 use crate::line::{LineScript, Rules};
 use crate::sample::{NodeColumnSet, SampleLayout};
-use crate::scene::{Object, Scene};
 use crate::scene::ids::MaterialId;
 use crate::scene::settings::{Background, FilterKind, LineOverrides, LineSettings, LineType, RayKinds};
+use crate::scene::{Object, Scene};
 use crate::shade::analysis::OutputFact;
 use crate::shade::bsdf::MIRROR_ROUGHNESS;
 use crate::shade::{InputSet, Mode, OutputSet, PairSet, Shader, Shaders};
@@ -197,6 +197,19 @@ impl Plan {
         plan
     }
 
+    /// Whether a shader or the overlap test asks how wide a pixel is, so that curved mirrors and glass must be accounted
+    /// for.
+    #[must_use]
+    pub fn follows_cones(&self) -> bool {
+        self.layout.columns.overlap || self.materials.iter().any(|material| material.inputs.intersects(InputSet::CONE))
+    }
+
+    /// Whether light samples are taken anywhere.
+    #[must_use]
+    pub fn takes_light_samples(&self) -> bool {
+        self.materials.iter().any(|material| material.used && (material.lights || material.behind.lights))
+    }
+
     /// Whether any ray but those of the camera may be traced along a path.
     #[must_use]
     pub fn has_secondary_rays(&self) -> bool {
@@ -207,6 +220,9 @@ impl Plan {
 /// How a surface's lines look.
 const LINE_OUTPUTS: OutputSet =
     OutputSet::LINE_COLOR.union(OutputSet::LINE_WIDTH).union(OutputSet::LINE_OPACITY).union(OutputSet::PRIORITY);
+
+/// What a shader gives to the line pass alone: colours and rays do not depend on it.
+pub const LINE_SLICE: OutputSet = LINE_OUTPUTS.union(OutputSet::FEATURE);
 
 /// Outputs that mark a hit whose script failed, which no analysis of the script foresees.
 #[must_use]

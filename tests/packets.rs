@@ -8,10 +8,10 @@ use tusche::scene::material::{Material, Script};
 use tusche::scene::mesh::Mesh;
 use tusche::scene::settings::RayKinds;
 use tusche::scene::{Object, SceneBuilder};
+use tusche::trace::World;
 use tusche::trace::packet::{LANES, RayStart};
 use tusche::trace::triangle::Ray;
 use tusche::trace::world::Hit;
-use tusche::trace::World;
 
 /// Coordinates among which some are equal, so that rays meet edges, vertices, coplanar and flat triangles, and run along
 /// axes and faces of boxes.

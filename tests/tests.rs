@@ -22,6 +22,7 @@ mod trace;
 // ... and the whole.
 mod flicker;
 mod same_bits;
+mod session;
 mod stability;
 mod surfaces;
 mod truth;

@@ -88,6 +88,14 @@ impl Rules {
         self
     }
 
+    /// Whether the same samples have the same lines under other rules. What the rules know of the widest line only bounds
+    /// the search.
+    #[must_use]
+    pub fn same_lines(&self, other: &Self) -> bool {
+        let narrower = self.widest.min(other.widest);
+        self.clone().with_widest(narrower) == other.clone().with_widest(narrower)
+    }
+
     /// The same rules, knowing what each material's script changes about its lines, by material id.
     #[must_use]
     pub fn with_scripts(mut self, materials: &[LineScript]) -> Self {

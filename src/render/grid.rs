@@ -7,7 +7,7 @@ use crate::sample::PixelRect;
 /// Strips are worked on in order, and only a few are in memory at a time, so memory grows with the short side of the
 /// picture alone.
 #[derive(Clone, Debug)]
-pub(super) struct Grid {
+pub(crate) struct Grid {
     /// All pixels that are sampled.
     pub region: PixelRect,
     /// Side of a tile in pixels; those at the right and lower border may be smaller.
@@ -75,7 +75,7 @@ impl Grid {
 
 /// A rectangle of tiles within a grid.
 #[derive(Debug, PartialEq, Eq)]
-pub(super) struct Part {
+pub(crate) struct Part {
     /// Upper left pixel.
     pub origin: [i32; 2],
     /// Tiles per row of the part.

@@ -9,7 +9,12 @@ mod files;
 mod grid;
 mod scripts;
 pub mod stats;
+mod totals;
 pub mod why;
+
+pub(crate) use grid::Grid;
+pub(crate) use scripts::ScriptedLines;
+pub(crate) use totals::Totals;
 
 pub use files::{PictureFile, layers_of, render_files};
 
@@ -22,18 +27,15 @@ use rayon::prelude::*;
 use crate::clock::CpuClock;
 use crate::diag::{Diagnostic, Diagnostics};
 use crate::film::{FilmTile, FilmWindow, develop};
-use crate::line::{LineBuffer, LineCounts, LineTile, Method, TileBounds, Window, find_lines};
+use crate::line::{LineBuffer, LineTile, Method, TileBounds, Window, find_lines};
 use crate::math::DVec3;
 use crate::plan::Plan;
-use crate::sample::{GateCounts, PixelRect, SampleBuffer};
+use crate::sample::{PixelRect, SampleBuffer};
 use crate::scene::Scene;
-use crate::scene::ids::MaterialId;
 use crate::shade::{Lighting, ShadeErrors, Shaders};
 use crate::trace::wave::TracedTile;
-use crate::trace::{RayCounts, TileTracer, TraceContext, World};
-use grid::Grid;
-use scripts::ScriptedLines;
-use stats::{Lines, Seconds, ShaderStats, Stats};
+use crate::trace::{TileTracer, TraceContext, World};
+use stats::Stats;
 
 /// How to render; none of it changes the picture but `crop`, which leaves out parts.
 #[derive(Clone, Debug)]
@@ -116,7 +118,7 @@ pub fn render(
 
 /// The largest side of a tile, for a number of samples per pixel: a tile holds at most 2²² samples, some hundred
 /// megabytes, if that leaves it a pixel.
-fn largest_tile(samples: u32) -> u32 {
+pub(crate) fn largest_tile(samples: u32) -> u32 {
     ((1 << 22) / samples.max(1)).isqrt().max(1)
 }
 
@@ -168,20 +170,6 @@ enum Product {
     Developed { seconds: f64 },
 }
 
-#[derive(Default)]
-struct Totals {
-    seconds: Seconds,
-    rays: RayCounts,
-    lines: LineCounts,
-    surfaces_behind: u64,
-    samples: u64,
-    bytes: u64,
-    hits: Vec<u64>,
-    shade_seconds: Vec<f64>,
-    /// By material, misses first.
-    gate: Vec<GateCounts>,
-}
-
 impl<'a> Render<'a> {
     fn new(
         scene: &'a Scene,
@@ -197,7 +185,6 @@ impl<'a> Render<'a> {
         let border = plan.lines.as_ref().map_or(0, |lines| lines.reach) + plan.filter.reach();
         let tile = options.tile.clamp(1, largest_tile(scene.render().samples));
         let grid = Grid::new(crop.grown(border).intersection(&picture), tile);
-        let materials = scene.materials().len();
         Self {
             scene,
             shaders,
@@ -211,12 +198,7 @@ impl<'a> Render<'a> {
             samples: (0..grid.tiles()).map(|_| None).collect(),
             lines: (0..grid.tiles()).map(|_| None).collect(),
             jobs_done: AtomicUsize::new(0),
-            totals: Totals {
-                hits: vec![0; materials],
-                shade_seconds: vec![0.0; materials],
-                gate: vec![GateCounts::default(); materials + 1],
-                ..Totals::default()
-            },
+            totals: Totals::new(scene.materials().len()),
             complete: true,
             grid,
         }
@@ -339,109 +321,27 @@ impl<'a> Render<'a> {
 
     /// Puts a job's product in its place.
     fn take(&mut self, product: Product) {
-        let totals = &mut self.totals;
         match product {
             Product::Sampled { tile, traced, bounds, line_seconds } => {
-                totals.seconds.lines += line_seconds;
-                let TracedTile { samples, rays, hits, shade_seconds, seconds } = *traced;
-                let shading: f64 = shade_seconds.iter().sum();
-                totals.seconds.trace += seconds - shading;
-                totals.seconds.shade += shading;
-                totals.rays += rays;
-                totals.samples += samples.color.len() as u64;
-                totals.surfaces_behind += samples.surfaces_behind() as u64;
-                totals.bytes += (samples.bytes() + bounds.as_ref().map_or(0, TileBounds::bytes)) as u64;
-                totals.hits.iter_mut().zip(&hits).for_each(|(total, hits)| *total += hits);
-                totals.shade_seconds.iter_mut().zip(&shade_seconds).for_each(|(total, seconds)| *total += seconds);
-                totals.gate.iter_mut().zip(&samples.gate).for_each(|(total, gate)| *total += *gate);
-                self.samples[tile] = Some(Box::new(SampledTile { buffer: samples, bounds }));
+                self.totals.seconds.lines += line_seconds;
+                self.totals.add_traced(&traced);
+                self.totals.add_samples(&traced.samples, bounds.as_ref());
+                self.samples[tile] = Some(Box::new(SampledTile { buffer: traced.samples, bounds }));
             }
             Product::Lined { tile, lines, seconds } => {
-                totals.seconds.lines += seconds;
-                totals.lines += lines.counts;
-                totals.gate.iter_mut().zip(&lines.gate).for_each(|(total, gate)| *total += *gate);
+                self.totals.seconds.lines += seconds;
+                self.totals.add_lines(&lines);
                 self.lines[tile] = Some(lines);
             }
-            Product::Developed { seconds } => totals.seconds.film += seconds,
+            Product::Developed { seconds } => self.totals.seconds.film += seconds,
         }
     }
 
     fn report(self) -> Report {
-        let totals = self.totals;
         let mut errors = ShadeErrors::default();
         for context in self.contexts.into_inner().unwrap_or_else(PoisonError::into_inner) {
             errors.merge(context.errors);
         }
-        let gate = totals.gate.iter().fold(GateCounts::default(), |mut sum, counts| {
-            sum += *counts;
-            sum
-        });
-        let shaders = self
-            .scene
-            .materials()
-            .iter()
-            .enumerate()
-            .map(|(index, material)| ShaderStats {
-                name: material.name.clone(),
-                mode: self.shaders.of(MaterialId::from_index(index)).mode().name(),
-                hits: totals.hits[index],
-                seconds: totals.shade_seconds[index],
-            })
-            .collect();
-        Report {
-            stats: Stats {
-                seconds: totals.seconds,
-                threads: rayon::current_num_threads(),
-                rays: totals.rays.into(),
-                samples: totals.samples,
-                bytes_per_sample: totals.bytes as f64 / (totals.samples as f64).max(1.0),
-                lines: Lines::new(totals.lines, totals.surfaces_behind, gate),
-                gate: gate.into(),
-                peak_rss_bytes: stats::peak_memory(),
-                triangles: self.scene.triangle_count(),
-                shaders,
-                plan: self.plan.to_string(),
-            },
-            script_errors: errors.into_diagnostics(),
-            warnings: gate_warnings(self.scene, self.shaders, &totals.gate),
-            complete: self.complete,
-            written: false,
-        }
+        self.totals.report(self.scene, self.shaders, self.plan, errors, self.complete)
     }
-}
-
-/// What the gate stopped, as a warning for each material and kind.
-fn gate_warnings(scene: &Scene, shaders: &Shaders, gate: &[GateCounts]) -> Diagnostics {
-    let mut warnings = Diagnostics::default();
-    let materials = scene.materials().iter().zip(shaders.iter());
-    for ((material, shader), counts) in materials.zip(gate.get(1..).unwrap_or_default()) {
-        let script = &scene.scripts()[material.script.index()].source.name;
-        let mut warn = |count: u64, what: &str, hint: String| {
-            if count > 0 {
-                let plural = if count == 1 { "" } else { "s" };
-                warnings.push(
-                    Diagnostic::warning(format!(
-                        "{script}: the shader of material `{}` gave {what} at {count} hit{plural}",
-                        material.name
-                    ))
-                    .hint(hint),
-                );
-            }
-        };
-        warn(counts.nan, "NaN", "NaN counts as 0; look for 0/0, sqrt or ln of negative numbers".into());
-        warn(counts.infinite, "an infinite number", "infinity counts as 0; look for divisions by 0".into());
-        warn(counts.negative, "a negative line width", "a width of 0 or less draws no line".into());
-        let max_width = scene.lines().max_width;
-        let declared = shader.params().max_line_width().filter(|declared| *declared < max_width);
-        let (name, limit, place) = match declared {
-            Some(declared) => ("max_line_width", declared, "the shader's `params()`"),
-            None => ("max_width", max_width, "[lines]"),
-        };
-        warn(
-            counts.clamped_widths,
-            &format!("a line wider than {name} ({limit} px)"),
-            format!("wider lines are drawn at {name}; raise it in {place} if they are meant"),
-        );
-    }
-    warnings
 }

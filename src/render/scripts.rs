@@ -8,7 +8,7 @@ use crate::shade::LineStyles;
 use crate::trace::TraceContext;
 
 /// The scripts of a scene, run in a thread's context.
-pub(super) struct ScriptedLines<'c, 'a> {
+pub(crate) struct ScriptedLines<'c, 'a> {
     context: &'c mut TraceContext<'a>,
     /// The camera's place in the world.
     origin: DVec3,
@@ -16,7 +16,7 @@ pub(super) struct ScriptedLines<'c, 'a> {
 }
 
 impl<'c, 'a> ScriptedLines<'c, 'a> {
-    pub(super) fn new(context: &'c mut TraceContext<'a>, origin: DVec3) -> Self {
+    pub(crate) fn new(context: &'c mut TraceContext<'a>, origin: DVec3) -> Self {
         Self { context, origin, styles: LineStyles::default() }
     }
 }

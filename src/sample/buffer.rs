@@ -60,6 +60,30 @@ impl PixelRect {
         Self { x0: self.x0 - margin, y0: self.y0 - margin, x1: self.x1 + margin, y1: self.y1 + margin }
     }
 
+    /// The smallest rectangle that covers both.
+    #[must_use]
+    pub fn union(&self, other: &Self) -> Self {
+        Self {
+            x0: self.x0.min(other.x0),
+            y0: self.y0.min(other.y0),
+            x1: self.x1.max(other.x1),
+            y1: self.y1.max(other.y1),
+        }
+    }
+
+    /// Copies values of the rectangle (row by row) to its place in a picture of this width; whether any differs from what
+    /// was there, to the bit.
+    pub(crate) fn copy_into(&self, values: &[f32], picture: &mut [f32], width: usize) -> bool {
+        let mut differs = false;
+        for (row, values) in values.chunks(self.width().max(1) as usize).enumerate() {
+            let start = (self.y0 as usize + row) * width + self.x0 as usize;
+            let place = &mut picture[start..start + values.len()];
+            differs |= place.iter().zip(values).any(|(a, b)| a.to_bits() != b.to_bits());
+            place.copy_from_slice(values);
+        }
+        differs
+    }
+
     /// What both cover; empty rectangles have no pixels.
     #[must_use]
     pub fn intersection(&self, other: &Self) -> Self {

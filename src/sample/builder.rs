@@ -29,7 +29,7 @@ pub struct SampleLayout {
 
 impl SampleLayout {
     /// The widest line that the gate lets pass for a shader (its id, from 1).
-    fn max_width_of(&self, shader: u32) -> f32 {
+    pub(super) fn max_width_of(&self, shader: u32) -> f32 {
         let declared = (shader as usize).checked_sub(1).and_then(|index| *self.declared_widths.get(index)?);
         declared.map_or(self.max_width, |declared| declared.min(self.max_width))
     }
@@ -354,7 +354,7 @@ impl<T: Copy + PartialEq> Column<T> {
     /// Appends the value of row number `row`. Behind the gate `==` means equal bits, so nothing is lost when equal
     /// values share one.
     #[inline]
-    fn push(&mut self, row: usize, value: T, expected: usize) {
+    pub(super) fn push(&mut self, row: usize, value: T, expected: usize) {
         match self {
             Self::Values(values) => values.push(value),
             Self::Palette { values, places } => {
@@ -396,7 +396,7 @@ impl<T: Copy + PartialEq> Column<T> {
     }
 
     /// The values in another order, in no more memory than they need.
-    fn ordered(self, order: Option<&[u32]>) -> Self {
+    pub(super) fn ordered(self, order: Option<&[u32]>) -> Self {
         if order.is_none() {
             return match self {
                 Self::Values(mut values) => {

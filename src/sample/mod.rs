@@ -14,6 +14,7 @@ pub mod gate;
 pub mod pair;
 pub mod path;
 pub mod position;
+mod restyle;
 
 pub use buffer::{Column, Node, NodeColumnSet, NodeColumns, PixelRect, Rows, SampleBuffer, SampleColor};
 pub use builder::{HandMadeSample, SampleBufferBuilder, SampleLayout};

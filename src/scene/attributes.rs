@@ -44,7 +44,7 @@ pub struct Attributes {
 }
 
 /// The attribute sets of a scene, by object and material.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct AttributeTable {
     /// Set 0 is empty.
     sets: Arc<Vec<AttributeSet>>,

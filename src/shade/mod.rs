@@ -30,6 +30,7 @@ pub mod params;
 pub mod program;
 pub mod reference;
 pub mod requests;
+mod same;
 mod script;
 pub mod synthetic;
 

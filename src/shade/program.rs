@@ -64,15 +64,15 @@ pub struct Shader {
     pub(super) program: Arc<Program>,
     pub(super) record: ParameterRecord,
     /// The kernel, or why there is none; `None` if the interpreter was asked for.
-    kernel: Option<Result<Arc<Kernel>, Finding>>,
+    pub(super) kernel: Option<Result<Arc<Kernel>, Finding>>,
     /// What styles lines, if the script has such a function.
     pub(super) line: Option<LineShader>,
     /// Kernels for batches with another number of lights than the scene has.
     other_kernels: Mutex<Vec<(usize, Option<Arc<Kernel>>)>>,
-    material_id: u32,
-    light_count: usize,
-    textures: Arc<[Arc<Texture>]>,
-    natives: Arc<[NativeFunction]>,
+    pub(super) material_id: u32,
+    pub(super) light_count: usize,
+    pub(super) textures: Arc<[Arc<Texture>]>,
+    pub(super) natives: Arc<[NativeFunction]>,
     pub(super) attributes: Arc<Vec<AttributeSet>>,
 }
 
@@ -186,7 +186,7 @@ impl Shader {
         Some(self.program.found(blame))
     }
 
-    fn lower(&self, entry: Entry, light_count: usize) -> Result<Arc<Kernel>, Finding> {
+    pub(super) fn lower(&self, entry: Entry, light_count: usize) -> Result<Arc<Kernel>, Finding> {
         let surroundings = Surroundings {
             textures: &self.textures,
             attributes: &self.attributes,

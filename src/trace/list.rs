@@ -74,7 +74,7 @@ impl TileTracer<'_> {
     }
 
     /// Shades the hits behind the first ones of a wave, as far as lines ask for it.
-    pub(super) fn shade_behind(&self, run: &mut Run, context: &mut TraceContext<'_>, work: &mut Work) {
+    pub(super) fn shade_behind(&self, run: &mut Run, context: &mut TraceContext<'_>, work: &mut Work<'_>) {
         let mut hits = std::mem::take(&mut run.behind);
         // By node: hits that are not there.
         let mut absent: BTreeMap<u32, Vec<Facet>> = BTreeMap::new();
@@ -128,12 +128,13 @@ impl TileTracer<'_> {
         group: &[WaveHit],
         run: &Run,
         context: &mut TraceContext<'_>,
-        work: &mut Work,
+        work: &mut Work<'_>,
         shaded: &mut Vec<Shaded>,
     ) {
         let Some(material) = group.first().map(|hit| hit.material) else { return };
         let plan = &self.plan.materials[material.index()];
-        let lights = if plan.behind.lights { self.light_samples(group, context, work) } else { Vec::new() };
+        let lights =
+            if plan.behind.lights { self.light_samples(group, &run.nodes, None, context, work) } else { Vec::new() };
         let clock = CpuClock::thread();
         let constant = plan.mode == Mode::Constant;
         if constant {

@@ -212,11 +212,12 @@ impl TileTracer<'_> {
         let priority = |hit: &Hit| self.scene.materials()[self.world.material(hit).index()].dielectric_priority;
         entries.sort_by_key(priority);
         match entries.get(from.counted as usize..).unwrap_or(&[]) {
-            [] => match (exit, thin.or(unknown)) {
-                (Some(exit), _) => see(exit, Pass::Bends, behind, false),
-                (None, Some(hit)) if hit.front || thin.is_some() => see(hit, Pass::Thin, behind, false),
-                (None, Some(hit)) => Some(Seen { error: self.spread(ray, &hit, &at), hit, ..plain }),
-                (None, None) => {
+            [] => match (exit, thin, unknown) {
+                (Some(exit), ..) => see(exit, Pass::Bends, behind, false),
+                (None, Some(sheet), _) => see(sheet, Pass::Thin, behind, false),
+                // As if it had been entered somewhere.
+                (None, None, Some(hit)) => Some(Seen { error: self.spread(ray, &hit, &at), hit, ..plain }),
+                (None, None, None) => {
                     *from = from.going_on(&last, media.len());
                     media.push(behind);
                     None
@@ -261,7 +262,7 @@ impl TileTracer<'_> {
     }
 
     /// Finds the bodies in which camera rays start.
-    pub(super) fn start_in_media(&self, run: &mut Run, context: &mut TraceContext<'_>, work: &mut Work) {
+    pub(super) fn start_in_media(&self, run: &mut Run, context: &mut TraceContext<'_>, work: &mut Work<'_>) {
         let bodies: SmallVec<[ObjectId; 8]> =
             self.plan.bodies.iter().zip(0..).filter(|(body, _)| **body).map(|(_, id)| ObjectId(id)).collect();
         let mut known: Option<(Vec3, u32)> = None;
@@ -284,7 +285,7 @@ impl TileTracer<'_> {
         bodies: &[ObjectId],
         run: &mut Run,
         context: &mut TraceContext<'_>,
-        work: &mut Work,
+        work: &mut Work<'_>,
     ) -> u32 {
         let mut ends: SmallVec<[(Hit, Ray); 4]> = bodies.iter().filter_map(|id| self.end_of(*id, origin)).collect();
         if ends.is_empty() {
@@ -339,11 +340,10 @@ impl TileTracer<'_> {
         hit: &WaveHit,
         run: &mut Run,
         context: &mut TraceContext<'_>,
-        work: &mut Work,
+        work: &mut Work<'_>,
     ) -> Option<Body> {
         let material = hit.material;
-        let lights = self.shade(std::slice::from_ref(hit), run, context, work);
-        drop(lights);
+        self.shade(std::slice::from_ref(hit), run, false, context, work);
         let outputs = self.outputs_of(material, 0, context);
         let opacity = self.opacity(outputs);
         (opacity > 0.0).then(|| self.body(hit, &self.bsdf(hit, outputs, 1.0))).flatten()

@@ -5,7 +5,9 @@
 //! - [`world`]: one hierarchy over the objects; closest hits and shadow rays. `hits` settles which hit of a ray comes first.
 //! - [`surface`]: from a hit to a place with normals, texture coordinates and error bounds.
 //! - [`wave`]: the rays of a tile, one depth of the ray tree at a time; `shadow` finds what lights give a hit, `scatter`
-//!   shades hits and sends rays on; `media` knows which bodies of glass a ray is in; `list` keeps what the line pass wants to know of surfaces behind the first.
+//!   shades hits and sends rays on; `media` knows which bodies of glass a ray is in; `list` keeps what the line pass wants
+//!   to know of surfaces behind the first.
+//! - `record`: what the rays of a tile met, so that it can be shaded again without tracing; `restyle`: only its lines.
 //!
 //! Everything here works relative to the camera's position, so that precision is best where the camera looks from,
 //! wherever in the world that is.
@@ -17,6 +19,8 @@ mod media;
 pub mod mesh_tree;
 pub mod packet;
 mod ray_tree;
+mod record;
+mod restyle;
 mod scatter;
 mod shadow;
 pub mod surface;
@@ -26,7 +30,9 @@ pub mod wave;
 pub mod world;
 mod world_packet;
 
-pub use wave::{RayCounts, TileTracer, TraceContext};
+pub use record::TileRecord;
+pub use restyle::Restyled;
+pub use wave::{Memory, RayCounts, TileTracer, TraceContext, TracedTile};
 pub use world::World;
 
 /// Bound on the relative error of `n` roundings in a row (Higham; pbrt 4th edition, section 6.8.1).

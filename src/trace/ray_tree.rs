@@ -2,6 +2,7 @@
 
 use super::cone::Cone;
 use super::media::{Crossing, Media};
+use super::record::RunRecord;
 use super::surface::Surface;
 use super::world::Hit;
 use crate::math::Vec3;
@@ -120,12 +121,15 @@ pub(super) struct Run {
     pub positions: Vec<Vec3>,
     /// Extra outputs at each camera node, `aov_count` each.
     pub aovs: Vec<Vec3>,
+    /// What its rays met, if somebody wants to know later.
+    pub record: RunRecord,
 }
 
 impl Run {
     /// Empties the run and keeps its memory.
     pub fn clear(&mut self) {
-        let Self { nodes, again, next, behind, surfaces, media, crossings, positions, aovs } = self;
+        // The record is told whether it is wanted.
+        let Self { nodes, again, next, behind, surfaces, media, crossings, positions, aovs, record: _ } = self;
         nodes.clear();
         again.clear();
         next.clear();

@@ -34,11 +34,11 @@ impl TileTracer<'_> {
         group: &[WaveHit],
         run: &mut Run,
         context: &mut TraceContext<'_>,
-        work: &mut Work,
+        work: &mut Work<'_>,
     ) {
         let Some(material) = group.first().map(|hit| hit.material) else { return };
         let plan = &self.plan.materials[material.index()];
-        let lights = self.shade(group, run, context, work);
+        let lights = self.shade(group, run, true, context, work);
         let lights_per_hit = if plan.lights { self.lighting.len() } else { 0 };
         for (index, hit) in group.iter().enumerate() {
             let outputs = self.outputs_of(material, index, context);
@@ -48,16 +48,22 @@ impl TileTracer<'_> {
     }
 
     /// Runs the shader of hits of one material, of which there is at least one; returns what lights give them, if anybody asks.
+    /// The run's record learns of it if they are those of their nodes.
     pub(super) fn shade(
         &self,
         group: &[WaveHit],
-        run: &Run,
+        run: &mut Run,
+        of_nodes: bool,
         context: &mut TraceContext<'_>,
-        work: &mut Work,
+        work: &mut Work<'_>,
     ) -> Vec<LightSample> {
         let Some(material) = group.first().map(|hit| hit.material) else { return Vec::new() };
         let plan = &self.plan.materials[material.index()];
-        let lights = if plan.lights { self.light_samples(group, context, work) } else { Vec::new() };
+        let lights = if plan.lights {
+            self.light_samples(group, &run.nodes, of_nodes.then_some(&mut run.record), context, work)
+        } else {
+            Vec::new()
+        };
         let clock = CpuClock::thread();
         if plan.mode == Mode::Constant {
             self.evaluate_once(material, context);
@@ -70,7 +76,12 @@ impl TileTracer<'_> {
     }
 
     /// What the shader returned for one of the hits that were shaded last.
-    pub(super) fn outputs_of<'c>(&self, material: MaterialId, index: usize, context: &'c TraceContext<'_>) -> Outputs<'c> {
+    pub(super) fn outputs_of<'c>(
+        &self,
+        material: MaterialId,
+        index: usize,
+        context: &'c TraceContext<'_>,
+    ) -> Outputs<'c> {
         let constant = self.plan.materials[material.index()].mode == Mode::Constant;
         match &context.constants[material.index()] {
             Some(batch) if constant => Outputs { batch, row: 0 },

@@ -3,7 +3,8 @@
 //! Shadow rays go straight on through see-through and transmissive surfaces and lose what those do not let pass; they
 //! are neither bent nor tinted, and reflection at glass takes nothing from them.
 
-use super::ray_tree::{WaveHit, WaveRay};
+use super::ray_tree::{TreeNode, WaveHit, WaveRay};
+use super::record::{RunRecord, UNKNOWN};
 use super::surface::Surface;
 use super::triangle::Ray;
 use super::wave::{TileTracer, TraceContext, Work, value};
@@ -20,17 +21,26 @@ impl TileTracer<'_> {
     pub(super) fn light_samples(
         &self,
         group: &[WaveHit],
+        nodes: &[TreeNode],
+        record: Option<&mut RunRecord>,
         context: &mut TraceContext<'_>,
-        work: &mut Work,
+        work: &mut Work<'_>,
     ) -> Vec<LightSample> {
         let mut samples = Vec::with_capacity(group.len() * self.lighting.len());
         let mut passed = Vec::new();
         let mut see_through = Vec::new();
         for hit in group {
             let surface = &hit.surface;
+            let known = match work.known {
+                Some(known) if hit.place == 0 => known.visibility(&nodes[hit.ray.node as usize], &hit.ray, &hit.hit),
+                _ => &[],
+            };
             for light in 0..self.lighting.len() {
                 let (mut sample, distance) = self.lighting.sample(light, surface.position);
-                if sample.direction.dot(surface.geometric_normal) <= 0.0 {
+                let known = known.get(light).copied().filter(|visibility| *visibility != UNKNOWN);
+                if let Some(visibility) = known {
+                    sample.visibility = visibility;
+                } else if sample.direction.dot(surface.geometric_normal) <= 0.0 {
                     // In its own shadow.
                     sample.visibility = 0.0;
                 } else if self.lighting.casts_shadows(light) && sample.radiance != Vec3::ZERO {
@@ -53,6 +63,13 @@ impl TileTracer<'_> {
         if !see_through.is_empty() {
             self.attenuate(&see_through, &mut samples, context, work);
         }
+        if let Some(record) = record {
+            for (hit, samples) in group.iter().zip(samples.chunks(self.lighting.len().max(1))) {
+                for (light, sample) in samples.iter().enumerate() {
+                    record.note_visibility(hit.ray.node, light, sample.visibility);
+                }
+            }
+        }
         samples
     }
 
@@ -63,7 +80,7 @@ impl TileTracer<'_> {
         passed: &[(usize, Ray, Hit)],
         samples: &mut [LightSample],
         context: &mut TraceContext<'_>,
-        work: &mut Work,
+        work: &mut Work<'_>,
     ) {
         let mut hits: Vec<(usize, WaveHit)> = passed
             .iter()
@@ -72,15 +89,8 @@ impl TileTracer<'_> {
                 let wave_ray = WaveRay { origin, direction, node: 0, after: None, passed: 0, media: 0, counted: 0 };
                 let surface = Surface::new(self.world, ray, hit);
                 let material = self.world.material(hit);
-                let hit = WaveHit {
-                    ray: wave_ray,
-                    hit: *hit,
-                    surface,
-                    material,
-                    depth: hit.t,
-                    place: 0,
-                    crossing: None,
-                };
+                let hit =
+                    WaveHit { ray: wave_ray, hit: *hit, surface, material, depth: hit.t, place: 0, crossing: None };
                 (*sample, hit)
             })
             .collect();

@@ -14,6 +14,7 @@ use super::cone::Cone;
 use super::media::Seen;
 use super::packet::{LANES, RayStart};
 use super::ray_tree::{Run, TreeNode, WaveHit, WaveRay};
+use super::record::TileRecord;
 use super::surface::Surface;
 use super::triangle::Ray;
 use super::world::{Hit, World};
@@ -26,7 +27,7 @@ use crate::scene::Scene;
 use crate::scene::ids::{MaterialId, ObjectId};
 use crate::scene::settings::{Background, RayKinds};
 use crate::shade::batch::{HitBatch, OutputBatch};
-use crate::shade::{InputSet, Lighting, LineStyles, OutputSet, PathKind, ShadeErrors, Shaders, Shading};
+use crate::shade::{Lighting, LineStyles, OutputSet, PathKind, ShadeErrors, Shaders, Shading};
 
 /// Samples of a run of pixels that are traced together.
 const RUN_SAMPLES: usize = 4096;
@@ -65,6 +66,8 @@ impl std::ops::AddAssign for RayCounts {
 pub struct TracedTile {
     /// The samples.
     pub samples: SampleBuffer,
+    /// What the rays met, if it was to be kept.
+    pub record: Option<TileRecord>,
     /// Rays traced.
     pub rays: RayCounts,
     /// Hits shaded, by material.
@@ -81,15 +84,14 @@ pub struct TileTracer<'a> {
     pub(super) plan: &'a Plan,
     pub(super) world: &'a World,
     pub(super) lighting: &'a Lighting,
-    positions: SamplePositions,
+    pub(super) positions: SamplePositions,
     /// Whether rays that leave the scene let the page show through.
     pub(super) transparent: bool,
     /// For each object the one that stands for its group; empty if there are no groups.
     pub(super) stand_ins: Vec<ObjectId>,
     /// A pixel's cone at the camera.
     pub(super) cone: Cone,
-    /// Whether a shader or the overlap test asks how wide a pixel is, so that curved mirrors and glass must be accounted
-    /// for.
+    /// [`Plan::follows_cones`].
     pub(super) follows_cones: bool,
     /// Outputs that mark a hit whose script failed, which no analysis of the script foresees.
     pub(super) marker: OutputSet,
@@ -148,18 +150,21 @@ impl<'a> TileTracer<'a> {
             transparent: settings.background == Background::Transparent,
             stand_ins: scene.stand_ins(),
             cone: Cone { width, spread: angle },
-            follows_cones: plan.layout.columns.overlap
-                || plan.materials.iter().any(|material| material.inputs.intersects(InputSet::CONE)),
+            follows_cones: plan.follows_cones(),
             marker: marker(plan.color, plan.lines.is_some()),
         }
     }
 
     /// Traces and shades all samples of a rectangle of pixels.
     pub fn trace(&self, rect: PixelRect, context: &mut TraceContext<'_>) -> TracedTile {
+        self.trace_with(rect, context, Memory::default())
+    }
+
+    /// The same with a memory: what is known of the rays is not traced again.
+    pub fn trace_with(&self, rect: PixelRect, context: &mut TraceContext<'_>, memory: Memory<'_>) -> TracedTile {
         let clock = CpuClock::thread();
-        let materials = self.scene.materials().len();
-        let mut work =
-            Work { rays: RayCounts::default(), hits: vec![0; materials], shade_seconds: vec![0.0; materials] };
+        let mut work = Work { known: memory.known, ..Work::new(self.scene.materials().len()) };
+        let mut record = memory.keep.then(|| TileRecord::new(self.lighting.len()));
         let mut samples = SampleBufferBuilder::new(rect, &self.plan.layout);
         let per_pixel = self.plan.layout.samples_per_pixel as usize;
         let run_samples = if self.plan.has_secondary_rays() { RUN_SAMPLES_BRANCHING } else { RUN_SAMPLES };
@@ -167,24 +172,26 @@ impl<'a> TileTracer<'a> {
         let mut first = 0;
         while first < rect.pixels() {
             let run = first..(first + run_pixels).min(rect.pixels());
-            self.trace_run(rect, run.clone(), &mut samples, context, &mut work);
+            self.trace_run(rect, run.clone(), (&mut samples, &mut record), context, &mut work);
             first = run.end;
         }
         let samples = samples.finish();
-        let Work { rays, hits, shade_seconds } = work;
-        TracedTile { samples, rays, hits, shade_seconds, seconds: clock.seconds() }
+        let record = record.map(TileRecord::finish);
+        let Work { rays, hits, shade_seconds, .. } = work;
+        TracedTile { samples, record, rays, hits, shade_seconds, seconds: clock.seconds() }
     }
 
     fn trace_run(
         &self,
         rect: PixelRect,
         pixels: Range<usize>,
-        samples: &mut SampleBufferBuilder,
+        (samples, record): (&mut SampleBufferBuilder, &mut Option<TileRecord>),
         context: &mut TraceContext<'_>,
-        work: &mut Work,
+        work: &mut Work<'_>,
     ) {
         let mut run = std::mem::take(&mut context.run);
         run.clear();
+        run.record.clear(record.is_some(), self.lighting.len());
         let offsets = self.start(rect, pixels, &mut run);
         if !self.plan.bodies.is_empty() {
             self.start_in_media(&mut run, context, work);
@@ -196,6 +203,9 @@ impl<'a> TileTracer<'a> {
         run.gather_radiance();
         run.surfaces.sort_by_key(|&(node, place, _)| (place, node));
         self.store(&run, &offsets, samples);
+        if let Some(record) = record {
+            record.add(&run);
+        }
         context.run = run;
     }
 
@@ -223,7 +233,7 @@ impl<'a> TileTracer<'a> {
     }
 
     /// Traces and shades one wave; what it mirrors and refracts becomes the next.
-    fn run_wave(&self, mut wave: Vec<WaveRay>, run: &mut Run, context: &mut TraceContext<'_>, work: &mut Work) {
+    fn run_wave(&self, mut wave: Vec<WaveRay>, run: &mut Run, context: &mut TraceContext<'_>, work: &mut Work<'_>) {
         // Rays that met something of opacity 0 go round again, for the same node.
         while !wave.is_empty() {
             let mut hits = self.find_hits(&wave, run, work);
@@ -241,23 +251,26 @@ impl<'a> TileTracer<'a> {
         }
     }
 
-    fn find_hits(&self, wave: &[WaveRay], run: &mut Run, work: &mut Work) -> Vec<WaveHit> {
+    fn find_hits(&self, wave: &[WaveRay], run: &mut Run, work: &mut Work<'_>) -> Vec<WaveHit> {
         let mut hits = Vec::with_capacity(wave.len());
         let mut list = Vec::new();
         let mut packet: Packet = [None; LANES];
         for (index, wave_ray) in wave.iter().enumerate() {
             if index % LANES == 0 {
-                packet = self.packet_hits(&wave[index..(index + LANES).min(wave.len())], run);
+                let rays = &wave[index..(index + LANES).min(wave.len())];
+                packet = if work.known.is_some() { [None; LANES] } else { self.packet_hits(rays, run) };
             }
-            let Run { nodes, behind, media, crossings, .. } = run;
+            let Run { nodes, behind, media, crossings, record, .. } = run;
             let node = &mut nodes[wave_ray.node as usize];
             let ray = Ray::new(wave_ray.origin, wave_ray.direction);
             let mut from = *wave_ray;
-            let mut packet = packet[index % LANES];
+            let known = work.known.filter(|_| !self.keeps_list(node.path)).and_then(|known| known.met(node, wave_ray));
+            let is_known = known.is_some();
+            let mut known = known.or(packet[index % LANES]);
             let seen = loop {
-                let kind = work.count(node.kind);
+                let kind = if is_known && known.is_some() { RayKinds::empty() } else { work.count(node.kind) };
                 list.clear();
-                let found = if let Some(found) = packet.take() {
+                let found = if let Some(found) = known.take() {
                     found
                 } else if from.passed >= MOST_INVISIBLE {
                     None
@@ -275,6 +288,7 @@ impl<'a> TileTracer<'a> {
                     break Some(seen);
                 }
             };
+            record.note(&from, seen.as_ref().map(|seen| &seen.hit));
             let Some(Seen { hit, error, crossing }) = seen else {
                 node.radiance = self.lighting.background(from.direction);
                 node.alpha = if self.transparent { 0.0 } else { 1.0 };
@@ -352,14 +366,28 @@ impl<'a> TileTracer<'a> {
     }
 }
 
-/// Counters of one tile.
-pub(super) struct Work {
+/// What is known of a tile's rays before they are traced, and whether what they meet is to be known afterwards.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Memory<'a> {
+    /// The record of an earlier picture of the same objects, camera and sample positions.
+    pub known: Option<&'a TileRecord>,
+    /// Whether to keep a record.
+    pub keep: bool,
+}
+
+/// Counters of one tile, and what is known of its rays.
+pub(super) struct Work<'a> {
+    pub known: Option<&'a TileRecord>,
     pub rays: RayCounts,
     pub hits: Vec<u64>,
     pub shade_seconds: Vec<f64>,
 }
 
-impl Work {
+impl Work<'_> {
+    pub fn new(materials: usize) -> Self {
+        Self { known: None, rays: RayCounts::default(), hits: vec![0; materials], shade_seconds: vec![0.0; materials] }
+    }
+
     /// Counts a ray towards a node; returns what objects see it as.
     pub fn count(&mut self, kind: PathKind) -> RayKinds {
         let (count, kind) = match kind {

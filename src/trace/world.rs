@@ -106,8 +106,23 @@ impl World {
     /// even if they are single-sided, or a glass body would have no far side.
     #[must_use]
     pub fn new(scene: &Scene, transmissive: &[bool]) -> Self {
+        Self::with_trees_of(scene, transmissive, None)
+    }
+
+    /// The same with the hierarchies of those meshes that an older world has, too.
+    #[must_use]
+    pub fn with_trees_of(scene: &Scene, transmissive: &[bool], older: Option<&Self>) -> Self {
         let origin = scene.camera().position;
-        let trees: Vec<Arc<MeshTree>> = scene.meshes().par_iter().map(|mesh| Arc::new(MeshTree::new(mesh))).collect();
+        let mut known: Vec<(&Arc<Mesh>, &Arc<MeshTree>)> =
+            older.iter().flat_map(|older| &older.objects).map(|object| (&object.mesh, &object.tree)).collect();
+        known.sort_by_key(|(_, tree)| Arc::as_ptr(tree));
+        known.dedup_by_key(|(_, tree)| Arc::as_ptr(tree));
+        let tree_of = |mesh: &Arc<Mesh>| {
+            let same = |known: &Arc<Mesh>| Arc::ptr_eq(known, mesh) || **known == **mesh;
+            let known = known.iter().find(|(known, _)| same(known));
+            known.map_or_else(|| Arc::new(MeshTree::new(mesh)), |(_, tree)| Arc::clone(tree))
+        };
+        let trees: Vec<Arc<MeshTree>> = scene.meshes().par_iter().map(tree_of).collect();
         let objects: Vec<PlacedObject> = scene
             .objects()
             .iter()

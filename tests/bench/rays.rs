@@ -18,10 +18,10 @@ use tusche::files::FileStore;
 use tusche::math::Vec3;
 use tusche::scene::settings::RayKinds;
 use tusche::scene::{Scene, file};
+use tusche::trace::World;
 use tusche::trace::packet::{LANES, RayStart};
 use tusche::trace::surface::Surface;
 use tusche::trace::triangle::Ray;
-use tusche::trace::World;
 
 const SIZE: [u32; 2] = [1280, 720];
 /// Side of the blocks of pixels in which rays are ordered.

@@ -37,12 +37,9 @@ pub enum Verdict {
 /// What differs.
 pub fn compare(script: &str, hits: &HitBatch, wanted: OutputSet) -> Result<Verdict, String> {
     let scene = scene(script);
-    let kernels = Shaders::compile(&scene, &Host::new());
-    let reference = Shaders::compile_for(&scene, &Host::new(), ShadingMode::Interpreter);
-    let (kernels, reference) = match (kernels, reference) {
-        (Ok((kernels, _)), Ok((reference, _))) => (kernels, reference),
-        (Err(a), Err(b)) if rendered(&a) == rendered(&b) => return Ok(Verdict::Refused(rendered(&a))),
-        (a, b) => return Err(format!("one compiles: {:?}\n{:?}", a.err(), b.err())),
+    let [kernels, reference] = match compile(&scene)? {
+        Ok(both) => both,
+        Err(refused) => return Ok(refused),
     };
     let shader = kernels.of(MaterialId(0));
     match shader.mode() {
@@ -55,16 +52,9 @@ pub fn compare(script: &str, hits: &HitBatch, wanted: OutputSet) -> Result<Verdi
     let shade = |shaders: &Shaders| {
         let (mut outputs, mut errors) = (OutputBatch::default(), ShadeErrors::default());
         Shading::new(&scene, shaders).shade(MaterialId(0), hits, wanted, &mut outputs, &mut errors);
-        (outputs, rendered(&errors.into_diagnostics()))
+        (outputs, errors)
     };
-    let ((a, errors_a), (b, errors_b)) = (shade(&kernels), shade(&reference));
-    if errors_a != errors_b {
-        return Err(format!("errors differ:\nkernel:\n{errors_a}\ninterpreter:\n{errors_b}"));
-    }
-    match difference(&a, &b) {
-        Some(what) => Err(what),
-        None => Ok(Verdict::Agrees),
-    }
+    verdict(shade(&kernels), shade(&reference), difference)
 }
 
 /// The same for a script's `line`.
@@ -73,30 +63,44 @@ pub fn compare(script: &str, hits: &HitBatch, wanted: OutputSet) -> Result<Verdi
 /// What differs.
 pub fn compare_lines(script: &str, pairs: &PairBatch) -> Result<Verdict, String> {
     let scene = scene(script);
-    let kernels = Shaders::compile(&scene, &Host::new());
-    let reference = Shaders::compile_for(&scene, &Host::new(), ShadingMode::Interpreter);
-    let (kernels, reference) = match (kernels, reference) {
-        (Ok((kernels, _)), Ok((reference, _))) => (kernels, reference),
-        (Err(a), Err(b)) if rendered(&a) == rendered(&b) => return Ok(Verdict::Refused(rendered(&a))),
-        (a, b) => return Err(format!("one compiles: {:?}\n{:?}", a.err(), b.err())),
+    let [kernels, reference] = match compile(&scene)? {
+        Ok(both) => both,
+        Err(refused) => return Ok(refused),
     };
-    let shader = kernels.of(MaterialId(0));
-    if let Some(blame) = shader.line_blame() {
+    if let Some(blame) = kernels.of(MaterialId(0)).line_blame() {
         return Ok(Verdict::Interpreted(blame.message));
     }
-    let shade = |shaders: &Shaders| {
+    let style = |shaders: &Shaders| {
         let (mut styles, mut errors) = (LineStyles::default(), ShadeErrors::default());
         Shading::new(&scene, shaders).style(MaterialId(0), pairs, &mut styles, &mut errors);
-        (styles, rendered(&errors.into_diagnostics()))
+        (styles, errors)
     };
-    let ((a, errors_a), (b, errors_b)) = (shade(&kernels), shade(&reference));
+    verdict(style(&kernels), style(&reference), |a, b| {
+        column("color", &a.color, &b.color).or_else(|| column("opacity", &a.opacity, &b.opacity))
+    })
+}
+
+/// The shaders of a scene as kernels and for the interpreter, or that both refuse the script.
+fn compile(scene: &Scene) -> Result<Result<[Shaders; 2], Verdict>, String> {
+    let compile = |mode| Shaders::compile_for(scene, &Host::new(), mode).map(|(shaders, _)| shaders);
+    match [ShadingMode::Auto, ShadingMode::Interpreter].map(compile) {
+        [Ok(kernels), Ok(reference)] => Ok(Ok([kernels, reference])),
+        [Err(a), Err(b)] if rendered(&a) == rendered(&b) => Ok(Err(Verdict::Refused(rendered(&a)))),
+        [a, b] => Err(format!("one compiles: {:?}\n{:?}", a.err(), b.err())),
+    }
+}
+
+/// What comes of what a kernel and the interpreter gave.
+fn verdict<T>(
+    (a, errors_a): (T, ShadeErrors),
+    (b, errors_b): (T, ShadeErrors),
+    difference: impl Fn(&T, &T) -> Option<String>,
+) -> Result<Verdict, String> {
+    let [errors_a, errors_b] = [errors_a, errors_b].map(|errors| rendered(&errors.into_diagnostics()));
     if errors_a != errors_b {
         return Err(format!("errors differ:\nkernel:\n{errors_a}\ninterpreter:\n{errors_b}"));
     }
-    match column("color", &a.color, &b.color).or_else(|| column("opacity", &a.opacity, &b.opacity)) {
-        Some(what) => Err(what),
-        None => Ok(Verdict::Agrees),
-    }
+    difference(&a, &b).map_or(Ok(Verdict::Agrees), Err)
 }
 
 fn rendered(faults: &Diagnostics) -> String {
@@ -202,11 +206,6 @@ impl Random {
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
         z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
         z ^ (z >> 31)
-    }
-
-    /// Bytes that spell a script.
-    pub fn bytes(&mut self, count: usize) -> Vec<u8> {
-        (0..count).map(|_| (self.next() >> 32) as u8).collect()
     }
 
     /// A float: mostly ordinary, now and then one of those that try formulas.

@@ -17,11 +17,16 @@ use self::agree::{Random, Verdict, compare, hits};
 /// How many random scripts are compared; the fuzz target does the same without end.
 const SCRIPTS: u64 = 2400;
 
+/// Bytes that spell a script.
+fn bytes(random: &mut Random) -> Vec<u8> {
+    let length = 40 + random.next() % 500;
+    (0..length).map(|_| (random.next() >> 32) as u8).collect()
+}
+
 /// A script at random, from its number.
 fn compare_random(seed: u64) -> (String, Result<Verdict, String>) {
     let mut random = Random(seed);
-    let length = 40 + (random.next() % 500) as usize;
-    let script = scripts::script(&random.bytes(length));
+    let script = scripts::script(&bytes(&mut random));
     let len = [1, 7, 16, 33][(random.next() % 4) as usize];
     let hits = hits(len, &mut random);
     let wanted = if seed.is_multiple_of(3) { OutputSet::LINE_WIDTH | OutputSet::COLOR } else { OutputSet::all() };
@@ -32,8 +37,7 @@ fn compare_random(seed: u64) -> (String, Result<Verdict, String>) {
 /// A script that styles lines at random, from its number.
 fn compare_random_lines(seed: u64) -> (String, Result<Verdict, String>) {
     let mut random = Random(seed);
-    let length = 40 + (random.next() % 500) as usize;
-    let script = scripts::line_script(&random.bytes(length));
+    let script = scripts::line_script(&bytes(&mut random));
     let len = [1, 7, 16, 33][(random.next() % 4) as usize];
     let pairs = agree::pairs(len, &mut random);
     let verdict = agree::compare_lines(&script, &pairs);

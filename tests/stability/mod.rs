@@ -131,6 +131,7 @@ fn every_hard_case_stays_within_its_bound() {
 
 #[test]
 fn the_readme_shows_the_table() {
-    let text = |path: &str| std::fs::read_to_string(root().join(path)).unwrap_or_else(|fault| panic!("{path}: {fault}"));
+    let text =
+        |path: &str| std::fs::read_to_string(root().join(path)).unwrap_or_else(|fault| panic!("{path}: {fault}"));
     assert!(text("README.md").contains(&text(TABLE)), "the table of hard cases in README.md is not that of {TABLE}");
 }

@@ -400,17 +400,16 @@ impl Model {
                 }
                 let lines = LineOverrides::default();
                 let script = into.add_script(script);
-                let id =
-                    into.add_material(Material {
-                        name,
-                        script,
-                        params,
-                        priority,
-                        dielectric_priority,
-                        double_sided,
-                        lines,
-                        span: None,
-                    });
+                let id = into.add_material(Material {
+                    name,
+                    script,
+                    params,
+                    priority,
+                    dielectric_priority,
+                    double_sided,
+                    lines,
+                    span: None,
+                });
                 if !attributes.is_empty() {
                     into.attributes.materials.insert(id, attributes);
                 }

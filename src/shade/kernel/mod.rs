@@ -112,6 +112,28 @@ impl Kernel {
         Slice { program, outputs, inputs, pair_inputs, may_fail }
     }
 
+    /// Whether the slices of two kernels for these outputs are one program that cannot fail.
+    pub fn same(&self, other: &Self, wanted: OutputSet) -> bool {
+        let (own, others) = (self.slice(wanted), other.slice(wanted));
+        let targets = |kernel: &Self, slice: &Slice| -> Vec<(Target, usize)> {
+            slice.outputs.iter().map(|(output, root)| (kernel.lowered.outputs[*output].target.clone(), *root)).collect()
+        };
+        !own.may_fail
+            && !others.may_fail
+            && self.lowered.fuel == other.lowered.fuel
+            && own.program.same(&others.program)
+            && targets(self, &own) == targets(other, &others)
+            && self.same_textures(other)
+    }
+
+    /// Whether two kernels read the same textures in the same way.
+    pub fn same_textures(&self, other: &Self) -> bool {
+        let (own, others) = (&self.lowered.textures, &other.lowered.textures);
+        let mut pairs = own.iter().zip(others);
+        own.len() == others.len()
+            && pairs.all(|(a, b)| a.place == b.place && (Arc::ptr_eq(&a.texture, &b.texture) || a.texture == b.texture))
+    }
+
     /// Shades a batch into columns. `failed` gets the rows that the interpreter must look at; their columns hold
     /// anything. `aovs` are the names of the extra outputs.
     pub fn run(

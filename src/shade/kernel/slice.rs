@@ -81,6 +81,21 @@ pub(super) struct Runnable {
     pub roots: Vec<Register>,
 }
 
+impl Runnable {
+    /// Whether another does the same to the last bit.
+    pub fn same(&self, other: &Self) -> bool {
+        let bits = |program: &Self| -> Vec<(u16, u32)> {
+            program.floats.constants.iter().map(|(register, value)| (*register, value.to_bits())).collect()
+        };
+        self.steps == other.steps
+            && self.floats.registers == other.floats.registers
+            && bits(self) == bits(other)
+            && self.ints == other.ints
+            && self.bools == other.bools
+            && self.roots == other.roots
+    }
+}
+
 /// Cuts the slice of a program that the roots need, and gives it registers.
 pub(super) fn cut(block: &Block, types: &[ValueType], roots: &[Operand]) -> Runnable {
     let mut needed = vec![false; types.len()];

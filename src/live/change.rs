@@ -1,0 +1,243 @@
+//! What an edit changed, and what must be done again for it.
+//!
+//! Setups are compared, not files: an edit that means nothing costs nothing, and two that come together cost what both
+//! touch. Where it is not certain that something stays as it was, it is done again.
+
+use std::collections::BTreeSet;
+
+use crate::plan::{LINE_SLICE, MaterialPlan, Plan};
+use crate::sample::SampleLayout;
+use crate::scene::Scene;
+use crate::scene::ids::MaterialId;
+use crate::scene::settings::LineSettings;
+use crate::shade::{InputSet, Mode, OutputSet, Shader, Shaders};
+
+/// What must be done again. Grows until it is done.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Redo {
+    /// Rays meet other things: all is traced.
+    pub trace: bool,
+    /// What hits see of lights has changed.
+    pub visibility: bool,
+    /// Everything is shaded, with rays that are known.
+    pub shade: bool,
+    /// All tiles are shaded that see one of these materials.
+    pub shade_materials: BTreeSet<MaterialId>,
+    /// Hits of these materials get other line attributes.
+    pub restyle: BTreeSet<MaterialId>,
+    /// The lines of all tiles are looked for.
+    pub lines: bool,
+    /// All tiles are developed.
+    pub film: bool,
+}
+
+/// A setup at some number of samples, as far as the picture depends on it.
+#[derive(Clone, Copy)]
+pub(super) struct View<'a> {
+    pub scene: &'a Scene,
+    pub shaders: &'a Shaders,
+    pub plan: &'a Plan,
+}
+
+impl Redo {
+    /// Everything.
+    pub fn all() -> Self {
+        Self { trace: true, visibility: true, shade: true, lines: true, film: true, ..Self::default() }
+    }
+
+    /// Whether there is nothing to do.
+    pub fn is_nothing(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// Adds what another asks for.
+    pub fn add(&mut self, other: &Self) {
+        self.trace |= other.trace;
+        self.visibility |= other.visibility;
+        self.shade |= other.shade;
+        self.shade_materials.extend(&other.shade_materials);
+        self.restyle.extend(&other.restyle);
+        self.lines |= other.lines;
+        self.film |= other.film;
+    }
+
+    /// What a tile needs of it that sees only some materials.
+    pub fn of_tile(&self, seen: impl Fn(MaterialId) -> bool) -> Self {
+        let seen_of = |ids: &BTreeSet<MaterialId>| ids.iter().copied().filter(|id| seen(*id)).collect();
+        Self { shade_materials: seen_of(&self.shade_materials), restyle: seen_of(&self.restyle), ..self.clone() }
+    }
+
+    /// What leads from one setup to another.
+    pub fn between(old: View<'_>, new: View<'_>) -> Self {
+        let mut redo = Self::default();
+        let same_rays = same_world(old, new)
+            && old.scene.camera() == new.scene.camera()
+            && same_sampling(old.scene, new.scene)
+            && old.plan.surfaces == new.plan.surfaces
+            // Which surfaces a list keeps depends on the tests.
+            && (new.plan.surfaces == 1 || same_tests(old, new));
+        if !same_rays {
+            return Self::all();
+        }
+        let lights = |view: View<'_>| view.scene.lights().to_vec();
+        if lights(old) != lights(new) && (old.plan.takes_light_samples() || new.plan.takes_light_samples()) {
+            redo.visibility = true;
+            redo.shade = true;
+        }
+        redo.shade |= old.scene.time() != new.scene.time();
+        redo.shade |= !same_shading(old, new);
+        redo.lines |= lines_differ(old.plan, new.plan);
+        redo.film |= old.plan.filter != new.plan.filter || old.plan.layers != new.plan.layers;
+        for (index, (a, b)) in old.shaders.iter().zip(new.shaders.iter()).enumerate() {
+            let id = MaterialId::from_index(index);
+            compare_material(&mut redo, id, (a, old), (b, new));
+        }
+        redo
+    }
+}
+
+impl View<'_> {
+    /// Whether the hierarchies are those of another view.
+    pub fn same_world(self, other: View<'_>) -> bool {
+        same_world(other, self) && self.scene.camera().position == other.scene.camera().position
+    }
+}
+
+/// Whether rays that start alike meet the same surfaces.
+fn same_world(old: View<'_>, new: View<'_>) -> bool {
+    let meshes = |scene: &Scene| scene.meshes().to_vec();
+    let priorities = |scene: &Scene| -> Vec<_> { scene.materials().iter().map(|material| material.priority).collect() };
+    let (a, b) = (old.scene.objects(), new.scene.objects());
+    let sided = |view: View<'_>| -> Vec<(bool, bool)> {
+        let materials = view.scene.materials().iter().zip(&view.plan.materials);
+        materials.map(|(material, plan)| (material.double_sided, plan.refracts)).collect()
+    };
+    a.len() == b.len()
+        && a.iter().zip(b).all(|(a, b)| {
+            a.mesh == b.mesh
+                && a.materials == b.materials
+                && a.world_from_object == b.world_from_object
+                && a.visible_to == b.visible_to
+                // Which of coplanar surfaces is seen.
+                && a.priority == b.priority
+        })
+        && priorities(old.scene) == priorities(new.scene)
+        && sided(old) == sided(new)
+        && {
+            let (a, b) = (meshes(old.scene), meshes(new.scene));
+            a.len() == b.len() && a.iter().zip(&b).all(|(a, b)| std::sync::Arc::ptr_eq(a, b) || a == b)
+        }
+}
+
+/// Whether the camera's rays start alike.
+fn same_sampling(old: &Scene, new: &Scene) -> bool {
+    let (a, b) = (old.render(), new.render());
+    a.size == b.size && a.samples == b.samples && a.seed == b.seed
+}
+
+/// Whether the tests of the line pass are the same, for every material.
+fn same_tests(old: View<'_>, new: View<'_>) -> bool {
+    let overrides = |view: View<'_>| -> Vec<_> { view.scene.materials().iter().map(|m| m.lines.clone()).collect() };
+    let tests = |view: View<'_>| view.plan.lines.as_ref().map(|lines| lines.tests.clone());
+    tests(old) == tests(new) && overrides(old) == overrides(new)
+}
+
+/// Whether hits of unchanged shaders become the same samples.
+fn same_shading(old: View<'_>, new: View<'_>) -> bool {
+    let (a, b) = (old.scene.render(), new.scene.render());
+    let dielectric_priorities =
+        |scene: &Scene| -> Vec<_> { scene.materials().iter().map(|material| material.dielectric_priority).collect() };
+    let groups = |scene: &Scene| -> Vec<_> { scene.objects().iter().map(|object| object.group.clone()).collect() };
+    let layout =
+        |view: View<'_>| SampleLayout { max_width: 0.0, declared_widths: Vec::new(), ..view.plan.layout.clone() };
+    a.background == b.background
+        && a.ambient == b.ambient
+        && layout(old) == layout(new)
+        && old.plan.color == new.plan.color
+        && old.plan.reflection_depth == new.plan.reflection_depth
+        && old.plan.refraction_depth == new.plan.refraction_depth
+        && old.plan.bodies == new.plan.bodies
+        && dielectric_priorities(old.scene) == dielectric_priorities(new.scene)
+        && old.plan.follows_cones() == new.plan.follows_cones()
+        && old.plan.lines.is_some() == new.plan.lines.is_some()
+        && old.scene.attributes() == new.scene.attributes()
+        && groups(old.scene) == groups(new.scene)
+        && old.shaders.aovs() == new.shaders.aovs()
+}
+
+/// Whether the line pass may find other lines in the same samples.
+fn lines_differ(old: &Plan, new: &Plan) -> bool {
+    match (&old.lines, &new.lines) {
+        (Some(a), Some(b)) => a.scripted != b.scripted || !a.rules.same_lines(&b.rules),
+        (None, None) => false,
+        _ => true,
+    }
+}
+
+/// Whether what scripts leave open about lines, and the widest line, are the same for a material.
+fn same_style(old: View<'_>, new: View<'_>, id: MaterialId, shader: &Shader) -> bool {
+    let draws = |settings: &LineSettings| (settings.width, settings.color);
+    let may_leave_out = |output: OutputSet| !shader.analysis().output(output).always;
+    let open = may_leave_out(OutputSet::LINE_WIDTH) || may_leave_out(OutputSet::LINE_COLOR);
+    let objects = old.scene.objects().iter().zip(new.scene.objects());
+    let mut drawing = objects.filter(|(object, _)| object.materials.contains(&id));
+    let limit = |view: View<'_>| {
+        let layout = &view.plan.layout;
+        (layout.max_width, layout.declared_widths.get(id.index()).copied().flatten())
+    };
+    (!open || draws(old.scene.lines()) == draws(new.scene.lines()))
+        && drawing.all(|(a, b)| a.priority == b.priority && a.lines == b.lines)
+        && old.scene.materials()[id.index()].priority == new.scene.materials()[id.index()].priority
+        && limit(old) == limit(new)
+}
+
+/// What differs between two shaders of a material.
+fn compare_material(redo: &mut Redo, id: MaterialId, (a, old): (&Shader, View<'_>), (b, new): (&Shader, View<'_>)) {
+    let (before, after) = (&old.plan.materials[id.index()], &new.plan.materials[id.index()]);
+    let same = a.same_as(b);
+    if same && before == after && same_style(old, new, id, b) {
+        return;
+    }
+    if !same && (a.styles_lines() || b.styles_lines()) {
+        redo.lines = true;
+    }
+    if before.blocks_light() != after.blocks_light()
+        || (!same && !after.blocks_light() && !a.same_outputs(b, OPACITY_SLICE))
+    {
+        // Its shadows may be other ones, wherever they fall.
+        redo.visibility = true;
+        redo.shade = true;
+        return;
+    }
+    // One surface of many in a list: only tracing tells which.
+    let restylable = new.plan.surfaces == 1
+        && same_but_for_lines(before, after)
+        && (same || a.same_outputs(b, OutputSet::all().difference(LINE_SLICE)))
+        && !a.may_fail(LINE_SLICE)
+        && !b.may_fail(LINE_SLICE);
+    if restylable {
+        redo.restyle.insert(id);
+    } else if new.plan.bodies.contains(&true) && after.refracts {
+        // Rays that start in it or pass it as another body outranks it have no hit there.
+        redo.shade = true;
+    } else {
+        redo.shade_materials.insert(id);
+    }
+}
+
+/// What shadow rays ask a see-through surface for.
+const OPACITY_SLICE: OutputSet =
+    OutputSet::OPACITY.union(OutputSet::TRANSMISSION).union(OutputSet::METALLIC).union(OutputSet::COLOR);
+
+/// Whether a material is rendered in the same way but for what lines ask of it.
+fn same_but_for_lines(old: &MaterialPlan, new: &MaterialPlan) -> bool {
+    let but_for_lines = |plan: &MaterialPlan| {
+        let mut plan = plan.clone();
+        plan.wanted = plan.wanted.difference(LINE_SLICE);
+        plan.inputs = InputSet::empty();
+        plan.mode = Mode::Constant;
+        plan.lights = false;
+        plan
+    };
+    but_for_lines(old) == but_for_lines(new)
+}

@@ -1,0 +1,565 @@
+//! The stages of a picture, each tile's results kept with what must be done to them again.
+//!
+//! All tiles are sampled, then their lines are found, then they are developed, on all threads. A tile that an edit does
+//! not reach is not touched: samples stay if no ray or shader changed for them, lines if no sample within reach did,
+//! pixels if no line or sample under their filter did. What is left to do is noted in the tiles, so that work can be
+//! dropped at any moment and taken up for a later setup.
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Instant;
+
+use rayon::prelude::*;
+
+use super::change::{Redo, View};
+use super::session::Setup;
+use crate::clock::CpuClock;
+use crate::diag::Diagnostics;
+use crate::film::{FilmTile, FilmWindow, Layer, develop};
+use crate::line::{LineBuffer, LineTile, Method, TileBounds, Window, find_lines};
+use crate::plan::Plan;
+use crate::render::{Control, Grid, Report, ScriptedLines, Totals, largest_tile};
+use crate::sample::{PixelRect, SampleBuffer};
+use crate::scene::Scene;
+use crate::scene::ids::MaterialId;
+use crate::shade::{Lighting, ShadeErrors};
+use crate::trace::{Memory, RayCounts, TileRecord, TileTracer, TraceContext, World};
+
+/// A setup at some number of samples, ready to be rendered.
+pub(super) struct Prepared {
+    pub setup: Arc<Setup>,
+    pub scene: Scene,
+    pub plan: Plan,
+    world: Arc<World>,
+    lighting: Lighting,
+    /// CPU seconds that building hierarchies took.
+    build_seconds: f64,
+}
+
+impl Prepared {
+    /// Prepares a setup; hierarchies are those of an older one as far as they are the same.
+    pub fn new(setup: &Arc<Setup>, samples: u32, older: Option<&Self>) -> Result<Self, Diagnostics> {
+        let mut builder = setup.scene.clone().into_builder();
+        builder.render.samples = samples;
+        let scene = builder.build()?;
+        let plan = Plan::new(&scene, &setup.shaders, &setup.layers);
+        let clock = CpuClock::process();
+        let view = View { scene: &scene, shaders: &setup.shaders, plan: &plan };
+        let world = match older {
+            Some(older) if view.same_world(older.view()) => Arc::clone(&older.world),
+            _ => {
+                let transmissive: Vec<bool> = plan.materials.iter().map(|material| material.refracts).collect();
+                Arc::new(World::with_trees_of(&scene, &transmissive, older.map(|older| &*older.world)))
+            }
+        };
+        let build_seconds = clock.seconds();
+        let lighting = Lighting::new(&scene, world.origin);
+        Ok(Self { setup: Arc::clone(setup), scene, plan, world, lighting, build_seconds })
+    }
+
+    pub fn view(&self) -> View<'_> {
+        View { scene: &self.scene, shaders: &self.setup.shaders, plan: &self.plan }
+    }
+}
+
+/// What was done again for a picture, and what was not. The rays are in its [`Stats`](crate::render::stats::Stats).
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Redone {
+    /// Tiles of the picture.
+    pub tiles: usize,
+    /// Tiles whose camera rays were traced.
+    pub traced: usize,
+    /// Tiles that were shaded again with rays that were known.
+    pub shaded: usize,
+    /// Tiles where only line and feature attributes of some materials were worked out again.
+    pub restyled: usize,
+    /// Tiles whose lines were searched.
+    pub lined: usize,
+    /// Tiles that were developed.
+    pub developed: usize,
+    /// Names of the materials whose shaders were run.
+    pub materials: Vec<String>,
+}
+
+impl Redone {
+    /// Everything, in one piece.
+    pub(super) fn everything(scene: &Scene) -> Self {
+        let materials = scene.materials().iter().map(|material| material.name.clone()).collect();
+        Self { tiles: 1, traced: 1, lined: 1, developed: 1, materials, ..Self::default() }
+    }
+}
+
+/// A tile of the picture and what is still to be done to it.
+#[derive(Default)]
+struct Tile {
+    redo: Redo,
+    /// Its lines must be searched, its pixels developed.
+    lines_due: bool,
+    film_due: bool,
+    samples: Option<Box<SampleBuffer>>,
+    bounds: Option<TileBounds>,
+    record: Option<TileRecord>,
+    lines: Option<Box<LineBuffer>>,
+    /// Hits by material when it was last shaded.
+    hits: Vec<u64>,
+    errors: ShadeErrors,
+    line_errors: ShadeErrors,
+}
+
+impl Tile {
+    fn for_lines(&self) -> Option<LineTile<'_>> {
+        Some(LineTile { buffer: self.samples.as_deref()?, bounds: self.bounds.as_ref()? })
+    }
+
+    fn bytes_but_for_record(&self) -> usize {
+        let lines =
+            self.lines.as_ref().map_or(0, |lines| size_of_val(&lines.samples[..]) + size_of_val(&lines.lines[..]));
+        self.samples.as_ref().map_or(0, |samples| samples.bytes())
+            + self.bounds.as_ref().map_or(0, TileBounds::bytes)
+            + lines
+    }
+}
+
+/// What a record takes of a sample whose ray is neither mirrored nor refracted.
+const CAMERA_RECORD_BYTES: u64 = 24;
+
+/// What a tile's samples cost to bring up to date.
+#[derive(Default)]
+struct Sampled {
+    /// Whether lines may look otherwise.
+    changed: bool,
+    /// Whether pixels may, even with the same lines.
+    pixels_changed: bool,
+    traced: bool,
+    shaded: bool,
+    restyled: bool,
+    rays: RayCounts,
+    hits: Vec<u64>,
+    shade_seconds: Vec<f64>,
+    seconds: f64,
+    line_seconds: f64,
+}
+
+/// All tiles of a picture at some number of samples.
+pub(super) struct Stages {
+    prepared: Prepared,
+    grid: Grid,
+    tiles: Vec<Tile>,
+    /// The picture: channels of all layers.
+    channels: Vec<Vec<f32>>,
+    /// How far changes reach that are still under way, in pixels: lines, film.
+    reach: [i32; 2],
+    /// What of the picture has changed since it was last up to date.
+    changed: Option<PixelRect>,
+    /// Seconds that everything took.
+    full_seconds: f64,
+    /// Whether what rays met is kept.
+    keeps_records: bool,
+}
+
+/// A picture that is up to date.
+pub(super) struct Outcome {
+    pub report: Report,
+    pub redone: Redone,
+    /// What may differ from before.
+    pub changed: PixelRect,
+}
+
+impl Stages {
+    /// Stages with everything still to be done.
+    pub fn new(prepared: Prepared, tile: u32, keeps_records: bool) -> Self {
+        let render = prepared.scene.render();
+        let grid = Grid::new(PixelRect::of_size(render.size), tile.clamp(1, largest_tile(render.samples)));
+        let tiles = (0..grid.tiles()).map(|_| Tile { redo: Redo::all(), ..Tile::default() }).collect();
+        let mut stages = Self {
+            prepared,
+            grid,
+            tiles,
+            channels: Vec::new(),
+            reach: [0; 2],
+            changed: None,
+            full_seconds: 0.0,
+            keeps_records,
+        };
+        stages.make_room();
+        stages.widen_reach();
+        stages
+    }
+
+    pub fn prepared(&self) -> &Prepared {
+        &self.prepared
+    }
+
+    pub fn samples(&self) -> u32 {
+        self.prepared.scene.render().samples
+    }
+
+    pub fn channels(&self) -> &[Vec<f32>] {
+        &self.channels
+    }
+
+    /// Bytes that a sample takes, with and without what its rays met.
+    pub fn bytes_per_sample(&self) -> [u64; 2] {
+        let samples = (self.grid.region.pixels() as u64 * u64::from(self.samples())).max(1);
+        let records: usize = self.tiles.iter().filter_map(|tile| Some(tile.record.as_ref()?.bytes())).sum();
+        let others: usize = self.tiles.iter().map(Tile::bytes_but_for_record).sum();
+        let [with, without] = [others + records, others].map(|bytes| bytes as u64 / samples);
+        // Where none was kept, a camera ray's node is what there would be at least.
+        [if self.keeps_records { with } else { without + CAMERA_RECORD_BYTES }, without]
+    }
+
+    /// What a setup asks for that is not done yet.
+    pub fn redo_for(&self, prepared: &Prepared) -> Redo {
+        Redo::between(self.prepared.view(), prepared.view())
+    }
+
+    /// About how many seconds shading takes that `redo` asks for, with what was left over from before.
+    pub fn seconds_to_shade(&self, redo: &Redo) -> f64 {
+        self.full_seconds * self.share_to_shade(redo)
+    }
+
+    /// The share of the tiles that must be shaded or traced for `redo`, with what was left over from before.
+    fn share_to_shade(&self, redo: &Redo) -> f64 {
+        let due = |tile: &&Tile| {
+            let mut redo = redo.of_tile(|id| sees(tile, id));
+            redo.add(&tile.redo);
+            redo.trace || redo.shade || !redo.shade_materials.is_empty()
+        };
+        self.tiles.iter().filter(due).count() as f64 / self.tiles.len().max(1) as f64
+    }
+
+    /// Notes what leads to a setup of the same size and number of samples; the setup is the one to come.
+    pub fn set(&mut self, prepared: Prepared, redo: &Redo) {
+        for tile in &mut self.tiles {
+            let of_tile = redo.of_tile(|id| sees(tile, id));
+            tile.lines_due |= redo.lines;
+            tile.film_due |= redo.film;
+            tile.redo.add(&of_tile);
+        }
+        self.prepared = prepared;
+        self.make_room();
+        self.widen_reach();
+    }
+
+    fn make_room(&mut self) {
+        let counts: usize = self.prepared.plan.layers.iter().map(|layer| layer.channels().len()).sum();
+        let pixels = self.grid.region.pixels();
+        self.channels.resize_with(counts, || vec![0.0; pixels]);
+    }
+
+    fn widen_reach(&mut self) {
+        let plan = &self.prepared.plan;
+        let lines = plan.lines.as_ref().map_or(0, |lines| lines.reach);
+        self.reach = [self.reach[0].max(lines), self.reach[1].max(plan.filter.reach())];
+    }
+
+    /// Does what is due. `None` if that was cancelled; the rest stays due.
+    pub fn work(&mut self, control: &Control<'_>) -> Option<Outcome> {
+        let start = Instant::now();
+        let mut totals = Totals::new(self.prepared.scene.materials().len());
+        totals.seconds.build = std::mem::take(&mut self.prepared.build_seconds);
+        let mut redone = Redone { tiles: self.tiles.len(), ..Redone::default() };
+        let done = AtomicUsize::new(0);
+        let cancelled = || control.cancel.is_some_and(|cancel| cancel.load(Ordering::Relaxed));
+        let step = || {
+            let done = done.fetch_add(1, Ordering::Relaxed) + 1;
+            if let Some(progress) = control.progress {
+                progress(done as f64 / (3 * self.grid.tiles()) as f64);
+            }
+        };
+
+        // Samples.
+        let prepared = &self.prepared;
+        let tracer = TileTracer::new(&prepared.scene, &prepared.plan, &prepared.world, &prepared.lighting);
+        let contexts = Contexts { prepared, free: Mutex::default() };
+        let (grid, keeps_records) = (&self.grid, self.keeps_records);
+        let sampled: Vec<(usize, Sampled)> = self
+            .tiles
+            .par_iter_mut()
+            .enumerate()
+            .filter(|(_, tile)| !tile.redo.is_nothing())
+            .filter_map(|(index, tile)| {
+                if cancelled() {
+                    return None;
+                }
+                let sampled = bring_up_to_date(tile, grid.rect(index), prepared, &tracer, &contexts, keeps_records);
+                step();
+                Some((index, sampled))
+            })
+            .collect();
+        for (index, sampled) in &sampled {
+            redone.traced += usize::from(sampled.traced);
+            redone.shaded += usize::from(sampled.shaded);
+            redone.restyled += usize::from(sampled.restyled);
+            totals.rays += sampled.rays;
+            let shading: f64 = sampled.shade_seconds.iter().sum();
+            totals.seconds.trace += sampled.seconds - shading;
+            totals.seconds.shade += shading;
+            totals.seconds.lines += sampled.line_seconds;
+            totals.hits.iter_mut().zip(&sampled.hits).for_each(|(total, hits)| *total += hits);
+            totals.shade_seconds.iter_mut().zip(&sampled.shade_seconds).for_each(|(total, own)| *total += own);
+            if sampled.changed {
+                for near in self.grid.around(*index, self.reach[0]).tiles {
+                    self.tiles[near].lines_due = true;
+                }
+            }
+            if sampled.pixels_changed {
+                for near in self.grid.around(*index, self.reach[1]).tiles {
+                    self.tiles[near].film_due = true;
+                }
+            }
+        }
+
+        // Lines.
+        let found: Vec<(usize, Found)> = (0..self.tiles.len())
+            .into_par_iter()
+            .filter(|index| self.tiles[*index].lines_due)
+            .filter_map(|index| {
+                if cancelled() || self.tiles.iter().any(|tile| tile.samples.is_none()) {
+                    return None;
+                }
+                let found = self.lines_of(index, &contexts);
+                step();
+                Some((index, found))
+            })
+            .collect();
+        drop(contexts);
+        for (index, found) in found {
+            redone.lined += 1;
+            totals.seconds.lines += found.seconds;
+            let tile = &mut self.tiles[index];
+            let same = match (&tile.lines, &found.lines) {
+                (Some(old), Some(new)) => old.samples == new.samples && old.lines == new.lines,
+                (None, None) => true,
+                _ => false,
+            };
+            tile.lines = found.lines;
+            tile.line_errors = found.errors;
+            tile.lines_due = false;
+            if !same {
+                for near in self.grid.around(index, self.reach[1]).tiles {
+                    self.tiles[near].film_due = true;
+                }
+            }
+        }
+
+        // Film.
+        let developed: Vec<(usize, FilmTile, f64)> = (0..self.tiles.len())
+            .into_par_iter()
+            .filter(|index| self.tiles[*index].film_due)
+            .filter_map(|index| {
+                if cancelled() || self.tiles.iter().any(|tile| tile.samples.is_none() || tile.lines_due) {
+                    return None;
+                }
+                let clock = CpuClock::thread();
+                let film = self.develop(index);
+                step();
+                Some((index, film, clock.seconds()))
+            })
+            .collect();
+        for (index, film, seconds) in developed {
+            redone.developed += 1;
+            totals.seconds.film += seconds;
+            if self.put(&film) {
+                self.changed = Some(self.changed.map_or(film.rect, |changed| changed.union(&film.rect)));
+            }
+            self.tiles[index].film_due = false;
+        }
+
+        let is_due = |tile: &Tile| !tile.redo.is_nothing() || tile.lines_due || tile.film_due;
+        if self.tiles.iter().any(is_due) {
+            return None;
+        }
+        self.reach = [0; 2];
+        self.widen_reach();
+        if redone.traced == redone.tiles {
+            self.full_seconds = start.elapsed().as_secs_f64();
+        }
+        totals.seconds.total = start.elapsed().as_secs_f64();
+        Some(self.outcome(totals, redone))
+    }
+
+    fn outcome(&mut self, mut totals: Totals, mut redone: Redone) -> Outcome {
+        let Prepared { scene, plan, setup, .. } = &self.prepared;
+        let mut errors = ShadeErrors::default();
+        for tile in &self.tiles {
+            if let Some(samples) = &tile.samples {
+                totals.add_samples(samples, tile.bounds.as_ref());
+            }
+            if let Some(lines) = &tile.lines {
+                totals.add_lines(lines);
+            }
+            errors.merge(tile.errors.clone());
+            errors.merge(tile.line_errors.clone());
+        }
+        let run = scene.materials().iter().zip(&totals.hits).filter(|(_, hits)| **hits > 0);
+        redone.materials = run.map(|(material, _)| material.name.clone()).collect();
+        let nothing = PixelRect { x0: 0, y0: 0, x1: 0, y1: 0 };
+        let changed = self.changed.take().unwrap_or(nothing);
+        Outcome { report: totals.report(scene, &setup.shaders, plan, errors, true), redone, changed }
+    }
+
+    fn lines_of(&self, index: usize, contexts: &Contexts<'_>) -> Found {
+        let clock = CpuClock::thread();
+        let Some(lines) = &self.prepared.plan.lines else { return Found::default() };
+        let part = self.grid.around(index, lines.reach);
+        let tiles = part.tiles.iter().map(|tile| self.tiles[*tile].for_lines()).collect();
+        let window = Window { origin: part.origin, tile: self.grid.tile, columns: part.columns, tiles };
+        let Some(target) = self.tiles[index].for_lines() else { return Found::default() };
+        let mut errors = ShadeErrors::default();
+        let found = if lines.scripted {
+            contexts.with(|context| {
+                let mut scripts = ScriptedLines::new(context, self.prepared.world.origin);
+                let found = find_lines(&window, target, &lines.rules, Method::Exact, Some(&mut scripts));
+                errors = std::mem::take(&mut context.errors);
+                found
+            })
+        } else {
+            find_lines(&window, target, &lines.rules, Method::Exact, None)
+        };
+        Found { lines: Some(Box::new(found)), errors, seconds: clock.seconds() }
+    }
+
+    fn develop(&self, index: usize) -> FilmTile {
+        let plan = &self.prepared.plan;
+        let part = self.grid.around(index, plan.filter.reach());
+        let of_tile = |tile: &usize| {
+            let tile = &self.tiles[*tile];
+            Some((tile.samples.as_deref()?, tile.lines.as_deref()))
+        };
+        let tiles = part.tiles.iter().map(of_tile).collect();
+        let window = FilmWindow { origin: part.origin, tile: self.grid.tile, columns: part.columns, tiles };
+        develop(&window, self.grid.rect(index), &plan.filter, &plan.layers)
+    }
+
+    /// Puts a tile into the picture; whether anything differs from before.
+    fn put(&mut self, film: &FilmTile) -> bool {
+        let stride = self.grid.region.width() as usize;
+        let mut changed = false;
+        for (all, part) in self.channels.iter_mut().zip(&film.channels) {
+            changed |= film.rect.copy_into(part, all, stride);
+        }
+        changed
+    }
+}
+
+/// Lines of a tile.
+#[derive(Default)]
+struct Found {
+    lines: Option<Box<LineBuffer>>,
+    errors: ShadeErrors,
+    seconds: f64,
+}
+
+/// Whether a tile may see a material.
+fn sees(tile: &Tile, material: MaterialId) -> bool {
+    tile.hits.get(material.index()).is_none_or(|hits| *hits > 0)
+}
+
+/// Memory and script engines, one for each thread that ever needs one.
+struct Contexts<'a> {
+    prepared: &'a Prepared,
+    free: Mutex<Vec<TraceContext<'a>>>,
+}
+
+impl<'a> Contexts<'a> {
+    fn with<T>(&self, work: impl FnOnce(&mut TraceContext<'a>) -> T) -> T {
+        let free = self.free.lock().unwrap_or_else(PoisonError::into_inner).pop();
+        let mut context = free.unwrap_or_else(|| TraceContext::new(&self.prepared.scene, &self.prepared.setup.shaders));
+        let result = work(&mut context);
+        self.free.lock().unwrap_or_else(PoisonError::into_inner).push(context);
+        result
+    }
+}
+
+/// Does what a tile's samples need.
+fn bring_up_to_date(
+    tile: &mut Tile,
+    rect: PixelRect,
+    prepared: &Prepared,
+    tracer: &TileTracer<'_>,
+    contexts: &Contexts<'_>,
+    keeps_record: bool,
+) -> Sampled {
+    let redo = std::mem::take(&mut tile.redo);
+    let mut sampled = Sampled::default();
+    let mut shade = redo.trace || redo.shade || redo.visibility || !redo.shade_materials.is_empty();
+    if !shade && !redo.restyle.is_empty() {
+        shade = !restyle(tile, &redo, prepared, tracer, contexts, &mut sampled);
+    }
+    if shade {
+        let known = tile.record.take().filter(|_| !redo.trace).map(|mut record| {
+            if redo.visibility {
+                record.forget_visibility();
+            }
+            record
+        });
+        contexts.with(|context| {
+            let memory = Memory { known: known.as_ref(), keep: keeps_record };
+            let traced = tracer.trace_with(rect, context, memory);
+            tile.errors = std::mem::take(&mut context.errors);
+            sampled.changed = tile.samples.as_deref() != Some(&traced.samples);
+            sampled.pixels_changed = sampled.changed;
+            sampled.traced = known.is_none();
+            sampled.shaded = known.is_some();
+            sampled.rays += traced.rays;
+            sampled.seconds += traced.seconds;
+            sampled.shade_seconds = traced.shade_seconds;
+            sampled.hits.clone_from(&traced.hits);
+            tile.hits = traced.hits;
+            tile.record = traced.record;
+            tile.samples = Some(Box::new(traced.samples));
+        });
+    }
+    let clock = CpuClock::thread();
+    match (&prepared.plan.lines, &tile.samples) {
+        (Some(lines), Some(samples)) if sampled.changed || redo.lines || tile.bounds.is_none() => {
+            tile.bounds = Some(TileBounds::new(samples, &lines.rules));
+        }
+        (None, _) => tile.bounds = None,
+        _ => {}
+    }
+    sampled.line_seconds = clock.seconds();
+    sampled
+}
+
+/// Gives hits of some materials their line attributes again; `false` if the tile must be shaded instead.
+fn restyle(
+    tile: &mut Tile,
+    redo: &Redo,
+    prepared: &Prepared,
+    tracer: &TileTracer<'_>,
+    contexts: &Contexts<'_>,
+    sampled: &mut Sampled,
+) -> bool {
+    let (Some(samples), Some(record)) = (tile.samples.as_deref_mut(), &tile.record) else { return false };
+    let materials = prepared.scene.materials().len();
+    sampled.hits = vec![0; materials];
+    sampled.shade_seconds = vec![0.0; materials];
+    let clock = CpuClock::thread();
+    let shaders = &prepared.setup.shaders;
+    let done = contexts.with(|context| {
+        redo.restyle.iter().all(|material| match tracer.restyle(*material, shaders, samples, record, context) {
+            Some(restyled) => {
+                sampled.changed |= restyled.changed;
+                sampled.rays += restyled.rays;
+                sampled.hits[material.index()] += restyled.hits;
+                sampled.shade_seconds[material.index()] += restyled.seconds;
+                true
+            }
+            None => {
+                // Whoever shades the tile hears what there is to say.
+                context.errors = ShadeErrors::default();
+                false
+            }
+        })
+    });
+    sampled.seconds += clock.seconds();
+    sampled.restyled = done;
+    sampled.pixels_changed = sampled.changed && prepared.plan.layers.contains(&Layer::Feature);
+    if !done {
+        // Half restyled: nobody knows how it was.
+        tile.samples = None;
+    }
+    done
+}

@@ -1,0 +1,155 @@
+//! Counters prove what is not done again.
+
+use std::sync::Arc;
+
+use tusche::film::Layer;
+use tusche::live::{LivePicture, Session, SessionOptions};
+use tusche::render::RenderOptions;
+
+use super::Sources;
+use crate::common::render_with;
+
+const SCENE: &str = r#"
+[render]
+size = [96, 64]
+samples = 2
+[camera]
+position = [0.0, 1.5, 4.0]
+target = [0.0, 0.5, 0.0]
+fov = 40.0
+[lines]
+width = 2.0
+normal = 40.0
+[materials.paint]
+shader = "paint.rhai"
+params = { ink = 2.0 }
+[materials.ground]
+shader = "ground.rhai"
+[[objects]]
+shape = "box"
+size = [5.0, 0.2, 5.0]
+material = "ground"
+translate = [0.0, -0.1, 0.0]
+[[objects]]
+shape = "sphere"
+radius = 0.5
+material = "paint"
+translate = [0.0, 0.5, 0.0]
+[[lights]]
+kind = "sun"
+direction = [-0.5, -0.8, -0.4]
+"#;
+const PAINT: &str = "fn params() { #{ ink: 1.0 } }
+fn surface(hit, p) { #{ base_color: rgb(0.8, 0.2, 0.1) * hit.normal.y, line_width: p.ink * hit.uv.x } }";
+const GROUND: &str = "fn surface(hit, p) { #{ base_color: rgb(0.5, 0.5, 0.5), roughness: 0.0, metallic: 0.5 } }";
+
+struct Desk {
+    session: Session,
+    sources: Sources,
+}
+
+impl Desk {
+    fn new() -> Self {
+        let options = SessionOptions { tile: 16, progressive: false, ..SessionOptions::default() };
+        let session = Session::new(options).unwrap_or_else(|fault| panic!("{fault}"));
+        let scripts = [("paint.rhai", PAINT), ("ground.rhai", GROUND)];
+        let scripts = scripts.map(|(name, text)| (name.to_owned(), text.to_owned())).to_vec();
+        let mut desk = Self { session, sources: Sources { scene: SCENE.to_owned(), scripts } };
+        let first = desk.save();
+        assert_eq!(first.redone.traced, first.redone.tiles);
+        desk
+    }
+
+    fn save(&mut self) -> Arc<LivePicture> {
+        self.session.set_scene(self.sources.setup(&[Layer::Rgba]));
+        self.session.render().unwrap_or_else(|faults| panic!("{faults}"))
+    }
+
+    fn replace(&mut self, old: &str, new: &str) -> Arc<LivePicture> {
+        let texts = self.sources.scripts.iter_mut().map(|(_, text)| text).chain([&mut self.sources.scene]);
+        let mut found = 0;
+        for text in texts {
+            found += text.matches(old).count();
+            *text = text.replace(old, new);
+        }
+        assert_eq!(found, 1, "`{old}` stands {found} times in the sources");
+        self.save()
+    }
+}
+
+fn rays(picture: &LivePicture) -> u64 {
+    let rays = picture.stats.rays;
+    rays.camera + rays.shadow + rays.reflection + rays.refraction
+}
+
+#[test]
+fn an_edit_that_means_nothing_does_nothing() {
+    let mut desk = Desk::new();
+    let again =
+        desk.replace("fn surface(hit, p) { #{ base_color: rgb(0.5", "fn surface(hit, p) {\n #{ base_color: rgb(0.5");
+    assert_eq!((rays(&again), again.redone.lined, again.redone.developed), (0, 0, 0), "{:?}", again.redone);
+    assert_eq!((again.redone.shaded, again.changed.pixels()), (0, 0), "{:?}", again.redone);
+}
+
+#[test]
+fn a_line_setting_runs_the_line_pass_and_the_film_alone() {
+    let mut desk = Desk::new();
+    let wider = desk.replace("normal = 40.0", "normal = 40.0\nmin_width = 1.0");
+    assert_eq!(rays(&wider), 0);
+    assert_eq!((wider.redone.traced, wider.redone.shaded, wider.redone.restyled), (0, 0, 0));
+    assert!(wider.redone.materials.is_empty());
+    assert_eq!(wider.redone.lined, wider.redone.tiles);
+    assert!(wider.redone.developed > 0 && wider.redone.developed < wider.redone.tiles, "{:?}", wider.redone);
+}
+
+#[test]
+fn the_line_width_of_a_script_runs_its_line_slice_alone() {
+    let mut desk = Desk::new();
+    let wider = desk.replace("line_width: p.ink * hit.uv.x", "line_width: p.ink * hit.uv.y");
+    assert_eq!(rays(&wider), 0);
+    assert_eq!((wider.redone.traced, wider.redone.shaded), (0, 0), "{:?}", wider.redone);
+    assert_eq!(wider.redone.materials, ["paint"]);
+    assert!(wider.redone.restyled > 0 && wider.redone.restyled < wider.redone.tiles, "{:?}", wider.redone);
+    assert!(wider.redone.lined < wider.redone.tiles, "{:?}", wider.redone);
+    // A parameter that only lines read is the same to it.
+    let thinner = desk.replace("ink = 2.0", "ink = 1.5");
+    assert_eq!((rays(&thinner), thinner.redone.shaded), (0, 0), "{:?}", thinner.redone);
+    assert_eq!(thinner.redone.materials, ["paint"]);
+}
+
+#[test]
+fn a_colour_is_shaded_with_rays_that_are_known() {
+    let mut desk = Desk::new();
+    let bluer = desk.replace("rgb(0.8, 0.2, 0.1)", "rgb(0.1, 0.2, 0.8)");
+    assert_eq!(rays(&bluer), 0);
+    assert_eq!((bluer.redone.traced, bluer.redone.restyled), (0, 0));
+    assert!(bluer.redone.shaded > 0 && bluer.redone.shaded < bluer.redone.tiles, "{:?}", bluer.redone);
+    assert!(bluer.redone.lined < bluer.redone.tiles, "{:?}", bluer.redone);
+}
+
+#[test]
+fn a_moved_light_traces_shadow_rays_alone() {
+    let mut desk = Desk::new();
+    let lit = desk.replace("[-0.5, -0.8, -0.4]", "[0.5, -0.8, -0.4]");
+    assert_eq!((lit.stats.rays.camera, lit.stats.rays.reflection), (0, 0));
+    assert!(lit.stats.rays.shadow > 0);
+    assert_eq!(lit.redone.traced, 0);
+}
+
+#[test]
+fn a_moved_object_is_traced() {
+    let mut desk = Desk::new();
+    let moved = desk.replace("translate = [0.0, 0.5, 0.0]", "translate = [0.2, 0.5, 0.0]");
+    assert_eq!(moved.redone.traced, moved.redone.tiles);
+}
+
+/// Found by random edits: what a surface of opacity 0 saw of the lights was taken for what the surface behind it sees.
+#[test]
+fn what_an_invisible_surface_sees_of_the_lights_is_its_own() {
+    let mut desk = Desk::new();
+    desk.replace("base_color: rgb(0.8, 0.2, 0.1) * hit.normal.y", "opacity: 0.0 * hit.uv.x");
+    desk.replace("roughness: 0.0, metallic: 0.5", "color: rgb(0.5, 0.5, 0.5)");
+    let lit = desk.replace("color: rgb(0.5, 0.5, 0.5)", "roughness: 1.0");
+    let (fresh, _) = render_with(&desk.sources.scene(), &[Layer::Rgba], &RenderOptions::default());
+    assert!(lit.channels == fresh.channels, "{:?}", lit.redone);
+}
