@@ -96,6 +96,27 @@ impl Rules {
         self.clone().with_widest(narrower) == other.clone().with_widest(narrower)
     }
 
+    /// Whether bounds of a tile that were made by other rules serve these, too: how far apart attributes must be, and
+    /// what lines look like but for their width, does not enter them.
+    #[must_use]
+    pub fn same_bounds(&self, other: &Self) -> bool {
+        let narrower = self.widest.min(other.widest);
+        let read = |rules: &Self| {
+            let Tests { uv_squared, chord_squared, feature, overlap, .. } = rules.tests;
+            [uv_squared, chord_squared, feature, overlap].map(|threshold| threshold < f32::INFINITY)
+        };
+        let widths = |rules: &Self| {
+            let settings = &rules.settings;
+            let narrowed = rules.clone().with_widest(narrower);
+            (settings.min_width, settings.width_compensation, rules.unit_gap, narrowed.types)
+        };
+        read(self) == read(other)
+            && widths(self) == widths(other)
+            && self.settings.paths == other.settings.paths
+            && self.settings.surfaces == other.settings.surfaces
+            && self.no_scripts() == other.no_scripts()
+    }
+
     /// The same rules, knowing what each material's script changes about its lines, by material id.
     #[must_use]
     pub fn with_scripts(mut self, materials: &[LineScript]) -> Self {

@@ -17,6 +17,8 @@ use crate::shade::{InputSet, Mode, OutputSet, Shader, Shaders};
 pub(super) struct Redo {
     /// Rays meet other things: all is traced.
     pub trace: bool,
+    /// Which of several surfaces at one place comes first may have changed.
+    pub ties: bool,
     /// What hits see of lights has changed.
     pub visibility: bool,
     /// Everything is shaded, with rays that are known.
@@ -27,6 +29,8 @@ pub(super) struct Redo {
     pub restyle: BTreeSet<MaterialId>,
     /// The lines of all tiles are looked for.
     pub lines: bool,
+    /// So that their search needs other bounds.
+    pub bounds: bool,
     /// All tiles are developed.
     pub film: bool,
 }
@@ -42,7 +46,7 @@ pub(super) struct View<'a> {
 impl Redo {
     /// Everything.
     pub fn all() -> Self {
-        Self { trace: true, visibility: true, shade: true, lines: true, film: true, ..Self::default() }
+        Self { trace: true, visibility: true, shade: true, lines: true, bounds: true, film: true, ..Self::default() }
     }
 
     /// Whether there is nothing to do.
@@ -53,11 +57,13 @@ impl Redo {
     /// Adds what another asks for.
     pub fn add(&mut self, other: &Self) {
         self.trace |= other.trace;
+        self.ties |= other.ties;
         self.visibility |= other.visibility;
         self.shade |= other.shade;
         self.shade_materials.extend(&other.shade_materials);
         self.restyle.extend(&other.restyle);
         self.lines |= other.lines;
+        self.bounds |= other.bounds;
         self.film |= other.film;
     }
 
@@ -74,10 +80,16 @@ impl Redo {
             && old.scene.camera() == new.scene.camera()
             && same_sampling(old.scene, new.scene)
             && old.plan.surfaces == new.plan.surfaces
+            && old.plan.bodies == new.plan.bodies
             // Which surfaces a list keeps depends on the tests.
             && (new.plan.surfaces == 1 || same_tests(old, new));
         if !same_rays {
             return Self::all();
+        }
+        if !same_ties(old.scene, new.scene) {
+            redo.ties = true;
+            redo.visibility = true;
+            redo.shade = true;
         }
         let lights = |view: View<'_>| view.scene.lights().to_vec();
         if lights(old) != lights(new) && (old.plan.takes_light_samples() || new.plan.takes_light_samples()) {
@@ -87,6 +99,10 @@ impl Redo {
         redo.shade |= old.scene.time() != new.scene.time();
         redo.shade |= !same_shading(old, new);
         redo.lines |= lines_differ(old.plan, new.plan);
+        redo.bounds |= match (&old.plan.lines, &new.plan.lines) {
+            (Some(a), Some(b)) => !a.rules.same_bounds(&b.rules),
+            (a, b) => a.is_some() != b.is_some(),
+        };
         redo.film |= old.plan.filter != new.plan.filter || old.plan.layers != new.plan.layers;
         for (index, (a, b)) in old.shaders.iter().zip(new.shaders.iter()).enumerate() {
             let id = MaterialId::from_index(index);
@@ -99,14 +115,15 @@ impl Redo {
 impl View<'_> {
     /// Whether the hierarchies are those of another view.
     pub fn same_world(self, other: View<'_>) -> bool {
-        same_world(other, self) && self.scene.camera().position == other.scene.camera().position
+        same_world(other, self)
+            && same_ties(other.scene, self.scene)
+            && self.scene.camera().position == other.scene.camera().position
     }
 }
 
 /// Whether rays that start alike meet the same surfaces.
 fn same_world(old: View<'_>, new: View<'_>) -> bool {
     let meshes = |scene: &Scene| scene.meshes().to_vec();
-    let priorities = |scene: &Scene| -> Vec<_> { scene.materials().iter().map(|material| material.priority).collect() };
     let (a, b) = (old.scene.objects(), new.scene.objects());
     let sided = |view: View<'_>| -> Vec<(bool, bool)> {
         let materials = view.scene.materials().iter().zip(&view.plan.materials);
@@ -118,15 +135,21 @@ fn same_world(old: View<'_>, new: View<'_>) -> bool {
                 && a.materials == b.materials
                 && a.world_from_object == b.world_from_object
                 && a.visible_to == b.visible_to
-                // Which of coplanar surfaces is seen.
-                && a.priority == b.priority
         })
-        && priorities(old.scene) == priorities(new.scene)
         && sided(old) == sided(new)
         && {
             let (a, b) = (meshes(old.scene), meshes(new.scene));
             a.len() == b.len() && a.iter().zip(&b).all(|(a, b)| std::sync::Arc::ptr_eq(a, b) || a == b)
         }
+}
+
+/// Whether of several surfaces at one place the same come first.
+fn same_ties(old: &Scene, new: &Scene) -> bool {
+    let of_objects = |scene: &Scene| -> Vec<_> { scene.objects().iter().map(|object| object.priority).collect() };
+    let of_materials = |scene: &Scene| -> Vec<_> {
+        scene.materials().iter().map(|material| (material.priority, material.dielectric_priority)).collect()
+    };
+    of_objects(old) == of_objects(new) && of_materials(old) == of_materials(new)
 }
 
 /// Whether the camera's rays start alike.
@@ -145,8 +168,6 @@ fn same_tests(old: View<'_>, new: View<'_>) -> bool {
 /// Whether hits of unchanged shaders become the same samples.
 fn same_shading(old: View<'_>, new: View<'_>) -> bool {
     let (a, b) = (old.scene.render(), new.scene.render());
-    let dielectric_priorities =
-        |scene: &Scene| -> Vec<_> { scene.materials().iter().map(|material| material.dielectric_priority).collect() };
     let groups = |scene: &Scene| -> Vec<_> { scene.objects().iter().map(|object| object.group.clone()).collect() };
     let layout =
         |view: View<'_>| SampleLayout { max_width: 0.0, declared_widths: Vec::new(), ..view.plan.layout.clone() };
@@ -156,8 +177,6 @@ fn same_shading(old: View<'_>, new: View<'_>) -> bool {
         && old.plan.color == new.plan.color
         && old.plan.reflection_depth == new.plan.reflection_depth
         && old.plan.refraction_depth == new.plan.refraction_depth
-        && old.plan.bodies == new.plan.bodies
-        && dielectric_priorities(old.scene) == dielectric_priorities(new.scene)
         && old.plan.follows_cones() == new.plan.follows_cones()
         && old.plan.lines.is_some() == new.plan.lines.is_some()
         && old.scene.attributes() == new.scene.attributes()
@@ -218,7 +237,7 @@ fn compare_material(redo: &mut Redo, id: MaterialId, (a, old): (&Shader, View<'_
     if restylable {
         redo.restyle.insert(id);
     } else if new.plan.bodies.contains(&true) && after.refracts {
-        // Rays that start in it or pass it as another body outranks it have no hit there.
+        // Rays that start in it, or pass it where another body outranks it, have no hit there.
         redo.shade = true;
     } else {
         redo.shade_materials.insert(id);

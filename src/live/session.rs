@@ -6,7 +6,7 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 
 use super::stages::{Outcome, Prepared, Redone, Stages};
-use crate::diag::{Diagnostic, Diagnostics};
+use crate::diag::{Diagnostic, Diagnostics, Source};
 use crate::film::{FilmTile, Layer};
 use crate::render::stats::Stats;
 use crate::render::{Control, RenderOptions, render};
@@ -155,6 +155,27 @@ impl Session {
         self.shared.cancel.store(true, Ordering::Relaxed);
         self.shared.changed.notify_all();
         state.generation
+    }
+
+    /// Gives a script of the scene another text; all else stays as it was set last. `name` is what messages call the
+    /// script, or the end of it behind a `/`. Modules and textures that the text names must be among those that the
+    /// scene's scripts name already. Returns the generation and the warnings.
+    ///
+    /// # Errors
+    /// If nothing was set, there is no such script, or the text is at fault; then what was shown before stays.
+    pub fn set_shader(&self, name: &str, text: &str) -> Result<(u64, Diagnostics), Diagnostics> {
+        let setup = self.setup().ok_or_else(|| Diagnostic::error("the session has no scene yet"))?;
+        let mut builder = setup.scene.clone().into_builder();
+        let is_meant = |known: &str| known == name || known.strip_suffix(name).is_some_and(|rest| rest.ends_with('/'));
+        let Some(script) = builder.scripts.iter_mut().find(|script| is_meant(&script.source.name)) else {
+            let names: Vec<&str> = setup.scene.scripts().iter().map(|script| script.source.name.as_str()).collect();
+            let fault = Diagnostic::error(format!("the scene has no script `{name}`"));
+            return Err(fault.hint(format!("it has: {}", names.join(", "))).into());
+        };
+        script.source = Source::new(script.source.name.clone(), text);
+        let scene = builder.build()?;
+        let (shaders, warnings) = setup.shaders.compile_again(&scene)?;
+        Ok((self.set_scene(Setup { scene, shaders, layers: setup.layers.clone() }), warnings))
     }
 
     /// The setup that is shown or being worked on.

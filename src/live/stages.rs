@@ -276,6 +276,7 @@ impl Stages {
         let sampled: Vec<(usize, Sampled)> = self
             .tiles
             .par_iter_mut()
+            .with_max_len(1)
             .enumerate()
             .filter(|(_, tile)| !tile.redo.is_nothing())
             .filter_map(|(index, tile)| {
@@ -313,6 +314,7 @@ impl Stages {
         // Lines.
         let found: Vec<(usize, Found)> = (0..self.tiles.len())
             .into_par_iter()
+            .with_max_len(1)
             .filter(|index| self.tiles[*index].lines_due)
             .filter_map(|index| {
                 if cancelled() || self.tiles.iter().any(|tile| tile.samples.is_none()) {
@@ -346,6 +348,7 @@ impl Stages {
         // Film.
         let developed: Vec<(usize, FilmTile, f64)> = (0..self.tiles.len())
             .into_par_iter()
+            .with_max_len(1)
             .filter(|index| self.tiles[*index].film_due)
             .filter_map(|index| {
                 if cancelled() || self.tiles.iter().any(|tile| tile.samples.is_none() || tile.lines_due) {
@@ -492,6 +495,9 @@ fn bring_up_to_date(
             if redo.visibility {
                 record.forget_visibility();
             }
+            if redo.ties {
+                record.forget_ties();
+            }
             record
         });
         contexts.with(|context| {
@@ -513,7 +519,7 @@ fn bring_up_to_date(
     }
     let clock = CpuClock::thread();
     match (&prepared.plan.lines, &tile.samples) {
-        (Some(lines), Some(samples)) if sampled.changed || redo.lines || tile.bounds.is_none() => {
+        (Some(lines), Some(samples)) if sampled.changed || redo.bounds || tile.bounds.is_none() => {
             tile.bounds = Some(TileBounds::new(samples, &lines.rules));
         }
         (None, _) => tile.bounds = None,

@@ -218,7 +218,9 @@ impl<'a> Render<'a> {
                 jobs.extend(strip(line_lag).into_iter().map(Job::Line));
             }
             jobs.extend(strip(film_lag).into_iter().map(Job::Develop));
-            let products = jobs.into_par_iter().map(|job| self.work(job, emit)).collect::<Result<Vec<_>, _>>()?;
+            // One by one: rayon would else give one thread a run of samples, which take longest, and share too late.
+            let products =
+                jobs.into_par_iter().with_max_len(1).map(|job| self.work(job, emit)).collect::<Result<Vec<_>, _>>()?;
             for product in products {
                 match product {
                     Some(product) => self.take(product),

@@ -67,28 +67,25 @@ impl Camera {
         })
     }
 
-    /// The ray through a film position of a picture of `size` pixels.
-    ///
-    /// The origin is relative to the camera's position, so that rays keep their precision far from the world's origin.
-    /// The film position is a whole pixel plus an offset in 0 … 1, so that wide pictures keep theirs. The direction
-    /// has unit length.
+    /// The ray through a film position of a picture of `size` pixels: [`CameraRays::ray`], for those who want only one.
     #[must_use]
     pub fn ray(&self, size: [u32; 2], pixel: [i32; 2], offset: [f32; 2]) -> (Vec3, Vec3) {
-        let [width, height] = size.map(f64::from);
-        let shift = self.film_shift;
-        let x = (f64::from(pixel[0]) - width / 2.0 + f64::from(offset[0]) + shift.x) / (height / 2.0);
-        let y = -(f64::from(pixel[1]) - height / 2.0 + f64::from(offset[1]) + shift.y) / (height / 2.0);
-        match self.projection {
-            Projection::Perspective { fov_y } => {
-                let half = libm::tan(fov_y / 2.0);
-                let direction = self.world_from_camera * DVec3::new(x * half, y * half, -1.0);
-                (Vec3::ZERO, direction.normalize().as_vec3())
-            }
-            Projection::Orthographic { height } => {
-                let half = height / 2.0;
-                let origin = self.world_from_camera * DVec3::new(x * half, y * half, 0.0);
-                (origin.as_vec3(), -self.world_from_camera.z_axis.as_vec3().normalize())
-            }
+        self.rays(size).ray(pixel, offset)
+    }
+
+    /// Makes ready for many rays of a picture of `size` pixels.
+    #[must_use]
+    pub fn rays(&self, size: [u32; 2]) -> CameraRays {
+        let half = match self.projection {
+            Projection::Perspective { fov_y } => libm::tan(fov_y / 2.0),
+            Projection::Orthographic { height } => height / 2.0,
+        };
+        CameraRays {
+            is_orthographic: matches!(self.projection, Projection::Orthographic { .. }),
+            half,
+            size: size.map(f64::from),
+            film_shift: self.film_shift,
+            world_from_camera: self.world_from_camera,
         }
     }
 
@@ -100,5 +97,39 @@ impl Camera {
             Projection::Perspective { fov_y } => (2.0 * portable::tan((fov_y / 2.0) as f32) / height_px as f32, 0.0),
             Projection::Orthographic { height } => (0.0, (height / f64::from(height_px)) as f32),
         }
+    }
+}
+
+/// A camera's rays for a picture of some size.
+#[derive(Clone, Copy, Debug)]
+pub struct CameraRays {
+    is_orthographic: bool,
+    /// Half the height of the view: at distance 1, or in world units.
+    half: f64,
+    /// In pixels.
+    size: [f64; 2],
+    film_shift: DVec2,
+    world_from_camera: DMat3,
+}
+
+impl CameraRays {
+    /// The ray through a film position: origin and direction.
+    ///
+    /// The origin is relative to the camera's position, so that rays keep their precision far from the world's origin.
+    /// The film position is a whole pixel plus an offset in 0 … 1, so that wide pictures keep theirs. The direction
+    /// has unit length.
+    #[inline]
+    #[must_use]
+    pub fn ray(&self, pixel: [i32; 2], offset: [f32; 2]) -> (Vec3, Vec3) {
+        let [width, height] = self.size;
+        let (shift, half) = (self.film_shift, self.half);
+        let x = (f64::from(pixel[0]) - width / 2.0 + f64::from(offset[0]) + shift.x) / (height / 2.0);
+        let y = -(f64::from(pixel[1]) - height / 2.0 + f64::from(offset[1]) + shift.y) / (height / 2.0);
+        if self.is_orthographic {
+            let origin = self.world_from_camera * DVec3::new(x * half, y * half, 0.0);
+            return (origin.as_vec3(), -self.world_from_camera.z_axis.as_vec3().normalize());
+        }
+        let direction = self.world_from_camera * DVec3::new(x * half, y * half, -1.0);
+        (Vec3::ZERO, direction.normalize().as_vec3())
     }
 }

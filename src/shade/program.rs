@@ -210,6 +210,7 @@ pub struct Shaders {
     shaders: Vec<Shader>,
     aovs: Vec<String>,
     host: Host,
+    mode: ShadingMode,
     /// Every name that some script's `params()` has.
     parameters: BTreeSet<String>,
     /// The scene's, for scripts that name images.
@@ -318,7 +319,15 @@ impl Shaders {
         let parameters = scripts.iter().flatten().flat_map(|(_, defaults)| defaults.keys().cloned()).collect();
         let aovs = extra_outputs(&shaders);
         let textures = scene.textures().to_vec();
-        Ok((Self { shaders, aovs, host: host.clone(), parameters, textures }, faults))
+        Ok((Self { shaders, aovs, host: host.clone(), mode, parameters, textures }, faults))
+    }
+
+    /// Compiles the scripts of another scene with the same host, and runs them in the same way.
+    ///
+    /// # Errors
+    /// As [`compile_for`](Self::compile_for).
+    pub fn compile_again(&self, scene: &Scene) -> Result<(Self, Diagnostics), Diagnostics> {
+        Self::compile_for(scene, &self.host, self.mode)
     }
 
     /// All shaders, in the order of the materials.

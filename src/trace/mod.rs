@@ -5,8 +5,8 @@
 //! - [`world`]: one hierarchy over the objects; closest hits and shadow rays. `hits` settles which hit of a ray comes first.
 //! - [`surface`]: from a hit to a place with normals, texture coordinates and error bounds.
 //! - [`wave`]: the rays of a tile, one depth of the ray tree at a time; `shadow` finds what lights give a hit, `scatter`
-//!   shades hits and sends rays on; `media` knows which bodies of glass a ray is in; `list` keeps what the line pass wants
-//!   to know of surfaces behind the first.
+//!   shades hits and sends rays on; `media` knows which bodies of glass a ray is in; `list` keeps what the line pass wants to
+//!   know of surfaces behind the first.
 //! - `record`: what the rays of a tile met, so that it can be shaded again without tracing; `restyle`: only its lines.
 //!
 //! Everything here works relative to the camera's position, so that precision is best where the camera looks from,

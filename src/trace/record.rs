@@ -41,7 +41,7 @@ struct PackedHit {
     barycentric: [f32; 2],
     /// 1 + object, 0 for a miss.
     object: u32,
-    /// The triangle and, in the uppermost bits, [`FRONT`] and [`BEHIND_INVISIBLE`].
+    /// The triangle and, in the uppermost bits, [`FRONT`], [`BEHIND_INVISIBLE`] and [`CROWDED`].
     triangle: u32,
 }
 
@@ -49,6 +49,8 @@ struct PackedHit {
 const FRONT: u32 = 1 << 31;
 /// The ray has passed invisible surfaces: it knows no more what it met first.
 const BEHIND_INVISIBLE: u32 = 1 << 30;
+/// There are other surfaces at the place.
+const CROWDED: u32 = 1 << 29;
 
 /// No light is this visible.
 pub(super) const UNKNOWN: f32 = -1.0;
@@ -190,6 +192,15 @@ impl TileRecord {
         }
     }
 
+    /// Forgets which of several surfaces at one place was met first.
+    pub fn forget_ties(&mut self) {
+        for met in self.paths.iter_mut().flat_map(|of_path| &mut of_path.met) {
+            if met.triangle & CROWDED != 0 {
+                met.triangle |= BEHIND_INVISIBLE;
+            }
+        }
+    }
+
     /// Bytes of heap memory.
     #[must_use]
     pub fn bytes(&self) -> usize {
@@ -253,16 +264,15 @@ impl PackedHit {
         let passed = flag(passed_invisible, BEHIND_INVISIBLE);
         match hit {
             None => Self { t: 0.0, barycentric: [0.0; 2], object: 0, triangle: passed },
-            // A triangle whose number does not fit is taken for one that is not known, as is one of several at one place: what is
-            // seen of those can depend on what the ray is in.
-            Some(hit) if hit.triangle >= BEHIND_INVISIBLE || hit.crowded => {
+            // A triangle whose number does not fit is taken for one that is not known.
+            Some(hit) if hit.triangle >= CROWDED => {
                 Self { t: 0.0, barycentric: [0.0; 2], object: 0, triangle: BEHIND_INVISIBLE }
             }
             Some(hit) => Self {
                 t: hit.t,
                 barycentric: hit.barycentric,
                 object: hit.object.0 + 1,
-                triangle: hit.triangle | flag(hit.front, FRONT) | passed,
+                triangle: hit.triangle | flag(hit.front, FRONT) | flag(hit.crowded, CROWDED) | passed,
             },
         }
     }
@@ -271,10 +281,10 @@ impl PackedHit {
         Some(Hit {
             t: self.t,
             object: ObjectId(self.object.checked_sub(1)?),
-            triangle: self.triangle & !(FRONT | BEHIND_INVISIBLE),
+            triangle: self.triangle & !(FRONT | BEHIND_INVISIBLE | CROWDED),
             barycentric: self.barycentric,
             front: self.triangle & FRONT != 0,
-            crowded: false,
+            crowded: self.triangle & CROWDED != 0,
         })
     }
 }

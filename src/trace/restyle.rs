@@ -54,6 +54,10 @@ impl TileTracer<'_> {
         let constant = plan.mode == Mode::Constant;
         let inputs = if constant { InputSet::empty() } else { shaders.of(material).needs(wanted) };
         let lit = plan.lights && inputs.intersects(InputSet::LIGHTS);
+        if lit && !self.plan.bodies.is_empty() {
+            // Shadow rays start farther from where bodies touch.
+            return None;
+        }
         let errors = context.errors.hits();
         let mut work = Work { known: Some(record), ..Work::new(self.scene.materials().len()) };
         let mut restyled = Restyled::default();
@@ -98,7 +102,6 @@ impl TileTracer<'_> {
         record: &TileRecord,
     ) -> Option<(Run, Vec<WaveHit>)> {
         let nodes = &samples.paths[path];
-        let size = self.scene.render().size;
         let mut run = Run::default();
         let mut group = Vec::with_capacity(rows.len());
         for (index, row) in rows.iter().enumerate() {
@@ -116,7 +119,7 @@ impl TileTracer<'_> {
                 None => {
                     let pixel = samples.pixel_of(sample);
                     let offset = self.positions.offset(pixel, sample % samples.samples_per_pixel);
-                    self.scene.camera().ray(size, pixel, offset)
+                    self.rays.ray(pixel, offset)
                 }
             };
             let ray = WaveRay { origin, direction, node: index as u32, after: None, passed: 0, media: 0, counted: 0 };

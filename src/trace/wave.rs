@@ -24,6 +24,7 @@ use crate::plan::{Plan, marker};
 use crate::sample::position::SamplePositions;
 use crate::sample::{PairBatch, PixelRect, SampleBuffer, SampleBufferBuilder, SampleColor};
 use crate::scene::Scene;
+use crate::scene::camera::CameraRays;
 use crate::scene::ids::{MaterialId, ObjectId};
 use crate::scene::settings::{Background, RayKinds};
 use crate::shade::batch::{HitBatch, OutputBatch};
@@ -85,6 +86,7 @@ pub struct TileTracer<'a> {
     pub(super) world: &'a World,
     pub(super) lighting: &'a Lighting,
     pub(super) positions: SamplePositions,
+    pub(super) rays: CameraRays,
     /// Whether rays that leave the scene let the page show through.
     pub(super) transparent: bool,
     /// For each object the one that stands for its group; empty if there are no groups.
@@ -147,6 +149,7 @@ impl<'a> TileTracer<'a> {
             world,
             lighting,
             positions: SamplePositions::new(settings.samples, settings.seed),
+            rays: scene.camera().rays(settings.size),
             transparent: settings.background == Background::Transparent,
             stand_ins: scene.stand_ins(),
             cone: Cone { width, spread: angle },
@@ -211,7 +214,6 @@ impl<'a> TileTracer<'a> {
 
     /// Makes the camera rays of a run of pixels the next wave; returns where in their pixels they start.
     fn start(&self, rect: PixelRect, pixels: Range<usize>, run: &mut Run) -> Vec<[f32; 2]> {
-        let size = self.scene.render().size;
         let per_pixel = self.plan.layout.samples_per_pixel;
         let count = pixels.len() * per_pixel as usize;
         let mut offsets = Vec::with_capacity(count);
@@ -220,7 +222,7 @@ impl<'a> TileTracer<'a> {
             let pixel = [rect.x0 + (index % width) as i32, rect.y0 + (index / width) as i32];
             for sample in 0..per_pixel {
                 let offset = self.positions.offset(pixel, sample);
-                let (origin, direction) = self.scene.camera().ray(size, pixel, offset);
+                let (origin, direction) = self.rays.ray(pixel, offset);
                 let node = run.nodes.len() as u32;
                 run.next.push(WaveRay { origin, direction, node, after: None, passed: 0, media: 0, counted: 0 });
                 run.nodes.push(TreeNode::root(index as u32 * per_pixel + sample, self.cone));
@@ -264,13 +266,12 @@ impl<'a> TileTracer<'a> {
             let node = &mut nodes[wave_ray.node as usize];
             let ray = Ray::new(wave_ray.origin, wave_ray.direction);
             let mut from = *wave_ray;
-            let known = work.known.filter(|_| !self.keeps_list(node.path)).and_then(|known| known.met(node, wave_ray));
-            let is_known = known.is_some();
-            let mut known = known.or(packet[index % LANES]);
+            let known = self.known_hit(work, node, wave_ray);
+            let mut at_once = known.or(packet[index % LANES]);
             let seen = loop {
-                let kind = if is_known && known.is_some() { RayKinds::empty() } else { work.count(node.kind) };
+                let kind = if known.is_some() { RayKinds::empty() } else { work.count(node.kind) };
                 list.clear();
-                let found = if let Some(found) = known.take() {
+                let found = if let Some(found) = at_once.take() {
                     found
                 } else if from.passed >= MOST_INVISIBLE {
                     None
@@ -307,6 +308,12 @@ impl<'a> TileTracer<'a> {
             hits.push(hit);
         }
         hits
+    }
+
+    /// What a ray meets, if a record tells. Lists want more than that, and what is seen of bodies depends on their shaders.
+    fn known_hit(&self, work: &Work<'_>, node: &TreeNode, ray: &WaveRay) -> Option<Option<Hit>> {
+        let known = work.known.filter(|_| self.plan.bodies.is_empty() && !self.keeps_list(node.path))?;
+        known.met(node, ray)
     }
 
     /// What camera rays meet that start together; `None` for rays that are to be traced one by one: those of mirrors and glass

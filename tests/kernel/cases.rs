@@ -112,6 +112,28 @@ fn every_construct_gives_the_same_bits() {
 }
 
 #[test]
+fn any_number_of_lights_gives_the_same_bits() {
+    let script = "fn surface(hit, p) {
+            let sum = vec3(0);
+            for i in 0..hit.light_count {
+                let light = hit.light(i);
+                sum += light.radiance * light.visibility * dot(hit.normal, light.direction);
+            }
+            let one = if hit.light_count > 0 { hit.light(hit.polygon_id % hit.light_count).direction } else { vec3(0) };
+            #{ base_color: sum, emission: hit.irradiance, feature: one }
+        }";
+    for count in [0, 1, 2, 3, 4, 5, 9] {
+        for len in [1, 16, 37, 300] {
+            let mut batch = hits(len, &mut Random(11));
+            let samples = hits(len * count, &mut Random(12)).lights;
+            batch.lights = samples.into_iter().take(len * count).collect();
+            batch.light_count = count;
+            assert_eq!(compare(script, &batch, OutputSet::all()), Ok(Verdict::Agrees), "{count} lights, {len} hits");
+        }
+    }
+}
+
+#[test]
 fn what_a_method_changes_is_kept_where_it_returns_early() {
     let script = "fn grow(by) { if this < 0.5 { return 1.0; } this += by; 2.0 }
         fn surface(hit, p) { let x = hit.depth; let y = x.grow(hit.distance); #{ line_width: x, aov_y: y } }";

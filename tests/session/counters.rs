@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use tusche::film::Layer;
-use tusche::live::{LivePicture, Session, SessionOptions};
+use tusche::live::{Event, LivePicture, Session, SessionOptions};
 use tusche::render::RenderOptions;
 
 use super::Sources;
@@ -148,8 +148,48 @@ fn a_moved_object_is_traced() {
 fn what_an_invisible_surface_sees_of_the_lights_is_its_own() {
     let mut desk = Desk::new();
     desk.replace("base_color: rgb(0.8, 0.2, 0.1) * hit.normal.y", "opacity: 0.0 * hit.uv.x");
-    desk.replace("roughness: 0.0, metallic: 0.5", "color: rgb(0.5, 0.5, 0.5)");
-    let lit = desk.replace("color: rgb(0.5, 0.5, 0.5)", "roughness: 1.0");
+    desk.replace("roughness: 0.0, metallic: 0.5", "color: rgb(0.1, 0.9, 0.5)");
+    let lit = desk.replace("color: rgb(0.1, 0.9, 0.5)", "roughness: 1.0");
     let (fresh, _) = render_with(&desk.sources.scene(), &[Layer::Rgba], &RenderOptions::default());
     assert!(lit.channels == fresh.channels, "{:?}", lit.redone);
+}
+
+#[test]
+fn a_script_is_replaced_by_name_and_a_faulty_one_is_not() {
+    let desk = Desk::new();
+    let (generation, warnings) = desk
+        .session
+        .set_shader("paint.rhai", &PAINT.replace("hit.uv.x", "hit.uv.y"))
+        .unwrap_or_else(|faults| panic!("{faults}"));
+    assert_eq!((generation, warnings.0.len()), (2, 0));
+    let picture = desk.session.render().unwrap_or_else(|faults| panic!("{faults}"));
+    assert_eq!((picture.generation, picture.redone.traced), (2, 0));
+    assert_eq!(picture.redone.materials, ["paint"]);
+    let fault = desk
+        .session
+        .set_shader("paint.rhai", "fn params() { #{ ink: 1.0 } } fn surface(hit, p) { #{ line_widht: 1.0 } }")
+        .unwrap_err();
+    assert!(fault.to_string().contains("line_width"), "{fault}");
+    let fault = desk.session.set_shader("pain.rhai", PAINT).unwrap_err();
+    assert!(fault.to_string().contains("ground.rhai"), "{fault}");
+    assert_eq!(desk.session.render().map(|picture| picture.generation).ok(), Some(2));
+}
+
+#[test]
+fn subscribers_hear_complete_pictures_with_ever_more_samples() {
+    let session =
+        Session::new(SessionOptions { tile: 16, ..SessionOptions::default() }).unwrap_or_else(|f| panic!("{f}"));
+    assert!(session.render().is_err(), "there is nothing to wait for");
+    let events = session.subscribe();
+    let scripts =
+        [("paint.rhai", PAINT), ("ground.rhai", GROUND)].map(|(name, text)| (name.into(), text.into())).to_vec();
+    let sources = Sources { scene: SCENE.replace("samples = 2", "samples = 5"), scripts };
+    let generation = session.set_scene(sources.setup(&[Layer::Rgba]));
+    session.render().unwrap_or_else(|faults| panic!("{faults}"));
+    let shown = events.try_iter().filter_map(|event| match event {
+        Event::Picture(picture) => Some((picture.generation, picture.samples, picture.is_final)),
+        _ => None,
+    });
+    let shown: Vec<_> = shown.collect();
+    assert_eq!(shown, [(generation, 1, false), (generation, 2, false), (generation, 4, false), (generation, 5, true)]);
 }

@@ -83,22 +83,17 @@ fn fill<T: Copy, S: Copy, const CHANNELS: usize>(
         (Some(_), values) if values.iter().all(Option::is_some) => {
             column.resize(end, make(channels.map(|channel| channel.lanes(0)[0])));
         }
-        _ => {
-            let mut left = rows;
-            for block in 0..rows.div_ceil(LANES) {
+        (present_everywhere, _) => {
+            let start = column.len();
+            column.resize(end, absent);
+            for (block, values) in column[start..].chunks_mut(LANES).enumerate() {
                 let (present, channels) = (present.lanes(block), channels.map(|channel| channel.lanes(block)));
-                let mut values = [absent; LANES];
-                for lane in 0..LANES {
-                    let mut of_lane = [channels[0][0]; CHANNELS];
-                    for (value, channel) in of_lane.iter_mut().zip(channels) {
-                        *value = channel[lane];
-                    }
-                    if present[lane] != 0 {
-                        values[lane] = make(of_lane);
+                let value = |lane: usize| make(channels.map(|channel| channel[lane]));
+                for (lane, place) in values.iter_mut().enumerate() {
+                    if present_everywhere.is_some() || present[lane] != 0 {
+                        *place = value(lane);
                     }
                 }
-                column.extend_from_slice(&values[..left.min(LANES)]);
-                left = left.saturating_sub(LANES);
             }
         }
     }

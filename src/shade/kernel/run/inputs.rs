@@ -4,6 +4,7 @@ use super::super::ir::{Column, Kind};
 use super::super::slice::Register;
 use super::bank::{Block, LANES, mask};
 use super::{Chunk, Registers};
+use crate::math::Vec3;
 use crate::shade::batch::LightSample;
 use crate::shade::library::hit;
 use crate::shade::names::{PairSet, PathKind};
@@ -105,44 +106,24 @@ impl Registers {
 
     #[inline(always)]
     pub(super) fn light(&mut self, index: Register, results: &[Register], chunk: &Chunk<'_>) {
-        let hits = chunk.hits;
-        let count = hits.light_count;
-        let mut outs: [Vec<Block<f32>>; 7] = std::array::from_fn(|i| self.floats.take(results[i]));
-        let lights = hits.lights.get(chunk.first * count..(chunk.first + chunk.rows) * count).unwrap_or_default();
+        let count = chunk.hits.light_count;
+        let mut outs: [Vec<Block<f32>>; LIGHT] = std::array::from_fn(|i| self.floats.take(results[i]));
+        let lights = chunk.lights();
         // Hits whose index is out of range have failed; they may read anything.
         let in_range = |index: i64| usize::try_from(index).unwrap_or_default().min(count.saturating_sub(1));
         let index_of = self.ints.view(index);
-        if !lights.is_empty() {
-            for block in 0..chunk.blocks() {
-                let index = index_of.block(block);
-                let first = block * LANES;
-                let mut columns = [[0.0; LANES]; 7];
-                let mut set = |lane: usize, light: &LightSample| {
-                    columns[0][lane] = light.direction.x;
-                    columns[1][lane] = light.direction.y;
-                    columns[2][lane] = light.direction.z;
-                    columns[3][lane] = light.radiance.x;
-                    columns[4][lane] = light.radiance.y;
-                    columns[5][lane] = light.radiance.z;
-                    columns[6][lane] = light.visibility;
-                };
-                match (index_of.uniform(), lights.get(first * count..(first + LANES) * count)) {
-                    // Mostly a loop asks for the same light at all hits.
-                    (Some(light), Some(lights)) => {
-                        let light = in_range(light);
-                        for (lane, lights) in lights.chunks_exact(count).enumerate() {
-                            set(lane, &lights[light]);
-                        }
-                    }
-                    _ => {
-                        for lane in 0..LANES {
-                            let row = (first + lane).min(chunk.rows - 1);
-                            set(lane, &lights[row * count + in_range(index[lane])]);
-                        }
-                    }
-                }
-                for (out, column) in outs.iter_mut().zip(columns) {
-                    out[block].0 = column;
+        // Mostly a loop asks for the same light at all hits, and there are few.
+        match (index_of.uniform().map(in_range), count) {
+            (Some(light), 1) => load_light::<1>(&mut outs, lights, light),
+            (Some(light), 2) => load_light::<2>(&mut outs, lights, light),
+            (Some(light), 3) => load_light::<3>(&mut outs, lights, light),
+            (Some(light), 4) => load_light::<4>(&mut outs, lights, light),
+            _ if lights.is_empty() => {}
+            _ => {
+                for block in 0..chunk.blocks() {
+                    let index = index_of.block(block);
+                    let hits = picked(lights, block, chunk.rows, count, |lane| in_range(index[lane]));
+                    store(&mut outs, block, columns(&hits, 0));
                 }
             }
         }
@@ -154,33 +135,131 @@ impl Registers {
     /// As [`hit::irradiance`], for a block of hits at a time.
     #[inline(always)]
     pub(super) fn irradiance(&mut self, results: &[Register], chunk: &Chunk<'_>) {
-        let hits = chunk.hits;
-        let count = hits.light_count;
+        let count = chunk.hits.light_count;
         let mut outs: [Vec<Block<f32>>; 3] = std::array::from_fn(|i| self.floats.take(results[i]));
-        let rows = chunk.first..chunk.first + chunk.rows;
-        let lights = hits.lights.get(rows.start * count..rows.end * count).unwrap_or_default();
-        let normals = hits.normal.get(rows).unwrap_or_default();
-        for block in 0..chunk.blocks() {
-            let [mut red, mut green, mut blue] = [[0.0; LANES]; 3];
-            if !normals.is_empty() && !lights.is_empty() {
-                for light in 0..count {
-                    for lane in 0..LANES {
-                        let row = (block * LANES + lane).min(chunk.rows - 1);
-                        let LightSample { direction, radiance, visibility } = lights[row * count + light];
-                        let facing = hit::facing(normals[row], direction);
-                        red[lane] += radiance.x * visibility * facing;
-                        green[lane] += radiance.y * visibility * facing;
-                        blue[lane] += radiance.z * visibility * facing;
+        let lights = chunk.lights();
+        let normals = chunk.hits.normal.get(chunk.first..chunk.first + chunk.rows).unwrap_or_default();
+        match count {
+            1 => add_lights::<1>(&mut outs, lights, normals),
+            2 => add_lights::<2>(&mut outs, lights, normals),
+            3 => add_lights::<3>(&mut outs, lights, normals),
+            4 => add_lights::<4>(&mut outs, lights, normals),
+            _ => {
+                for block in 0..chunk.blocks() {
+                    let mut sum = [[0.0; LANES]; 3];
+                    let mut room = None;
+                    if let Some(normals) = block_of(normals, block, &mut room)
+                        && !lights.is_empty()
+                    {
+                        for light in 0..count {
+                            let hits = picked(lights, block, chunk.rows, count, |_| light);
+                            add_light(&mut sum, normals, &columns(&hits, 0));
+                        }
                     }
+                    store(&mut outs, block, sum);
                 }
-            }
-            for (out, channel) in outs.iter_mut().zip([red, green, blue]) {
-                out[block].0 = channel;
             }
         }
         for (register, out) in results.iter().zip(outs) {
             self.floats.put(*register, out);
         }
+    }
+}
+
+impl<'a> Chunk<'a> {
+    /// The lights of its hits, hit by hit; none if they are not filled.
+    #[inline(always)]
+    fn lights(&self) -> &'a [LightSample] {
+        let count = self.hits.light_count;
+        self.hits.lights.get(self.first * count..(self.first + self.rows) * count).unwrap_or_default()
+    }
+}
+
+/// Columns of a light sample: direction, radiance, visibility.
+const LIGHT: usize = 7;
+
+/// One light of each hit of a block, as columns. Where the number of lights is known to the compiler, so are the
+/// distances between the samples, and these loads become shuffles of whole vectors.
+#[inline(always)]
+fn columns<const COUNT: usize>(hits: &[[LightSample; COUNT]; LANES], light: usize) -> [[f32; LANES]; LIGHT] {
+    let mut columns = [[0.0; LANES]; LIGHT];
+    for lane in 0..LANES {
+        let LightSample { direction, radiance, visibility } = &hits[lane][light];
+        columns[0][lane] = direction.x;
+        columns[1][lane] = direction.y;
+        columns[2][lane] = direction.z;
+        columns[3][lane] = radiance.x;
+        columns[4][lane] = radiance.y;
+        columns[5][lane] = radiance.z;
+        columns[6][lane] = *visibility;
+    }
+    columns
+}
+
+/// One light of each hit of a block, whatever the number of lights.
+#[inline(always)]
+fn picked(
+    lights: &[LightSample],
+    block: usize,
+    rows: usize,
+    count: usize,
+    light: impl Fn(usize) -> usize,
+) -> [[LightSample; 1]; LANES] {
+    std::array::from_fn(|lane| [lights[(block * LANES + lane).min(rows - 1) * count + light(lane)]])
+}
+
+/// The rows of a block; the last row is repeated to fill it, in `room`.
+#[inline(always)]
+fn block_of<'a, T: Copy>(rows: &'a [T], block: usize, room: &'a mut Option<[T; LANES]>) -> Option<&'a [T; LANES]> {
+    let (whole, rest) = rows.as_chunks::<LANES>();
+    match (whole.get(block), rest.last()) {
+        (Some(rows), _) => Some(rows),
+        (None, Some(last)) => Some(room.insert(std::array::from_fn(|lane| *rest.get(lane).unwrap_or(last)))),
+        (None, None) => None,
+    }
+}
+
+#[inline(always)]
+fn store<const COLUMNS: usize>(outs: &mut [Vec<Block<f32>>; COLUMNS], block: usize, columns: [[f32; LANES]; COLUMNS]) {
+    for (out, column) in outs.iter_mut().zip(columns) {
+        out[block].0 = column;
+    }
+}
+
+#[inline(always)]
+fn load_light<const COUNT: usize>(outs: &mut [Vec<Block<f32>>; LIGHT], lights: &[LightSample], light: usize) {
+    let (hits, _) = lights.as_chunks::<COUNT>();
+    for block in 0..hits.len().div_ceil(LANES) {
+        let mut room = None;
+        let Some(hits) = block_of(hits, block, &mut room) else { break };
+        store(outs, block, columns(hits, light));
+    }
+}
+
+#[inline(always)]
+fn add_lights<const COUNT: usize>(outs: &mut [Vec<Block<f32>>; 3], lights: &[LightSample], normals: &[Vec3]) {
+    let (hits, _) = lights.as_chunks::<COUNT>();
+    for block in 0..normals.len().div_ceil(LANES) {
+        let (mut sum, mut room, mut room_of_normals) = ([[0.0; LANES]; 3], None, None);
+        if let Some(hits) = block_of(hits, block, &mut room)
+            && let Some(normals) = block_of(normals, block, &mut room_of_normals)
+        {
+            for light in 0..COUNT {
+                add_light(&mut sum, normals, &columns(hits, light));
+            }
+        }
+        store(outs, block, sum);
+    }
+}
+
+#[inline(always)]
+fn add_light(sum: &mut [[f32; LANES]; 3], normals: &[Vec3; LANES], light: &[[f32; LANES]; LIGHT]) {
+    let [x, y, z, red, green, blue, visibility] = light;
+    for lane in 0..LANES {
+        let facing = hit::facing(normals[lane], Vec3::new(x[lane], y[lane], z[lane]));
+        sum[0][lane] += red[lane] * visibility[lane] * facing;
+        sum[1][lane] += green[lane] * visibility[lane] * facing;
+        sum[2][lane] += blue[lane] * visibility[lane] * facing;
     }
 }
 
