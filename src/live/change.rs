@@ -160,7 +160,7 @@ fn same_sampling(old: &Scene, new: &Scene) -> bool {
 
 /// Whether the tests of the line pass are the same, for every material.
 fn same_tests(old: View<'_>, new: View<'_>) -> bool {
-    let overrides = |view: View<'_>| -> Vec<_> { view.scene.materials().iter().map(|m| m.lines.clone()).collect() };
+    let overrides = |view: View<'_>| -> Vec<_> { view.scene.materials().iter().map(|m| m.lines).collect() };
     let tests = |view: View<'_>| view.plan.lines.as_ref().map(|lines| lines.tests.clone());
     tests(old) == tests(new) && overrides(old) == overrides(new)
 }
