@@ -139,8 +139,7 @@ impl SrgbBytes {
     }
 
     fn byte(&self, linear: f32) -> u8 {
-        // Also for NaN.
-        if !(linear >= Self::SMALLEST) {
+        if linear.is_nan() || linear < Self::SMALLEST {
             return 0;
         }
         let place = (linear.to_bits() >> Self::SHIFT) - (Self::SMALLEST.to_bits() >> Self::SHIFT);

@@ -124,7 +124,6 @@ impl View<'_> {
 /// Whether rays that start alike meet the same surfaces.
 fn same_world(old: View<'_>, new: View<'_>) -> bool {
     let meshes = |scene: &Scene| scene.meshes().to_vec();
-    let priorities = |scene: &Scene| -> Vec<_> { scene.materials().iter().map(|material| material.priority).collect() };
     let (a, b) = (old.scene.objects(), new.scene.objects());
     let sided = |view: View<'_>| -> Vec<(bool, bool)> {
         let materials = view.scene.materials().iter().zip(&view.plan.materials);
@@ -136,10 +135,7 @@ fn same_world(old: View<'_>, new: View<'_>) -> bool {
                 && a.materials == b.materials
                 && a.world_from_object == b.world_from_object
                 && a.visible_to == b.visible_to
-                // Which of coplanar surfaces is seen.
-                && a.priority == b.priority
         })
-        && priorities(old.scene) == priorities(new.scene)
         && sided(old) == sided(new)
         && {
             let (a, b) = (meshes(old.scene), meshes(new.scene));
@@ -164,7 +160,7 @@ fn same_sampling(old: &Scene, new: &Scene) -> bool {
 
 /// Whether the tests of the line pass are the same, for every material.
 fn same_tests(old: View<'_>, new: View<'_>) -> bool {
-    let overrides = |view: View<'_>| -> Vec<_> { view.scene.materials().iter().map(|m| m.lines.clone()).collect() };
+    let overrides = |view: View<'_>| -> Vec<_> { view.scene.materials().iter().map(|m| m.lines).collect() };
     let tests = |view: View<'_>| view.plan.lines.as_ref().map(|lines| lines.tests.clone());
     tests(old) == tests(new) && overrides(old) == overrides(new)
 }
@@ -172,8 +168,6 @@ fn same_tests(old: View<'_>, new: View<'_>) -> bool {
 /// Whether hits of unchanged shaders become the same samples.
 fn same_shading(old: View<'_>, new: View<'_>) -> bool {
     let (a, b) = (old.scene.render(), new.scene.render());
-    let dielectric_priorities =
-        |scene: &Scene| -> Vec<_> { scene.materials().iter().map(|material| material.dielectric_priority).collect() };
     let groups = |scene: &Scene| -> Vec<_> { scene.objects().iter().map(|object| object.group.clone()).collect() };
     let layout =
         |view: View<'_>| SampleLayout { max_width: 0.0, declared_widths: Vec::new(), ..view.plan.layout.clone() };
@@ -183,8 +177,6 @@ fn same_shading(old: View<'_>, new: View<'_>) -> bool {
         && old.plan.color == new.plan.color
         && old.plan.reflection_depth == new.plan.reflection_depth
         && old.plan.refraction_depth == new.plan.refraction_depth
-        && old.plan.bodies == new.plan.bodies
-        && dielectric_priorities(old.scene) == dielectric_priorities(new.scene)
         && old.plan.follows_cones() == new.plan.follows_cones()
         && old.plan.lines.is_some() == new.plan.lines.is_some()
         && old.scene.attributes() == new.scene.attributes()
@@ -245,7 +237,7 @@ fn compare_material(redo: &mut Redo, id: MaterialId, (a, old): (&Shader, View<'_
     if restylable {
         redo.restyle.insert(id);
     } else if new.plan.bodies.contains(&true) && after.refracts {
-        // Rays that start in it or pass it as another body outranks it have no hit there.
+        // Rays that start in it, or pass it where another body outranks it, have no hit there.
         redo.shade = true;
     } else {
         redo.shade_materials.insert(id);

@@ -364,7 +364,7 @@ impl TileTracer<'_> {
     pub(super) fn body(&self, hit: &WaveHit, bsdf: &crate::shade::Bsdf) -> Option<Body> {
         let passes = bsdf.transmission > 0.0 && bsdf.metallic < 1.0;
         let priority = self.scene.materials()[hit.material.index()].dielectric_priority;
-        passes.then(|| Body { key: (hit.hit.object, hit.material), priority, ior: bsdf.ior })
+        passes.then_some(Body { key: (hit.hit.object, hit.material), priority, ior: bsdf.ior })
     }
 }
 

@@ -14,7 +14,7 @@ use super::http::{Answer, request};
 use super::{INK, LIMIT, Watching, options, place};
 
 /// A browser with one window. Dropping it ends it.
-struct Browser {
+pub(super) struct Browser {
     driver: Child,
     address: String,
     session: String,
@@ -24,7 +24,7 @@ struct Browser {
 
 impl Browser {
     /// `None` where there is none.
-    fn start() -> Option<Self> {
+    pub fn start() -> Option<Self> {
         let chromium = ["chromium", "chromium-browser", "google-chrome"].into_iter().find_map(found)?;
         let chromedriver = found("chromedriver")?;
         let mut driver = Command::new(chromedriver)
@@ -75,18 +75,18 @@ impl Browser {
         value
     }
 
-    fn open(&self, url: &str) {
+    pub fn open(&self, url: &str) {
         self.call("POST", &format!("{}/url", self.session), &json!({ "url": url }));
     }
 
     /// The value of a script that ends with `return`.
-    fn run(&self, script: &str) -> Json {
+    pub fn run(&self, script: &str) -> Json {
         self.call("POST", &format!("{}/execute/sync", self.session), &json!({ "script": script, "args": [] }))
     }
 
     /// Runs a script until it gives something that counts as true.
     #[track_caller]
-    fn wait(&self, script: &str) -> Json {
+    pub fn wait(&self, script: &str) -> Json {
         let end = Instant::now() + LIMIT;
         loop {
             let value = self.run(script);

@@ -7,6 +7,7 @@ mod edits;
 mod errors;
 mod files;
 mod http;
+mod latency;
 mod page;
 mod tev;
 
