@@ -236,6 +236,9 @@ fn compare_material(redo: &mut Redo, id: MaterialId, (a, old): (&Shader, View<'_
         && !b.may_fail(LINE_SLICE);
     if restylable {
         redo.restyle.insert(id);
+    } else if new.plan.bodies.contains(&true) && after.refracts {
+        // Rays that start in it, or pass it where another body outranks it, have no hit there.
+        redo.shade = true;
     } else {
         redo.shade_materials.insert(id);
     }
