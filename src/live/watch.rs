@@ -5,8 +5,8 @@
 //! load; the last good picture stays meanwhile.
 //!
 //! A setup that arrives while the picture before it is still on its way drops that at once, with two exceptions that keep
-//! pictures coming however fast a scene is saved or a slider is dragged: it waits up to [`GRACE`] for the first picture of
-//! the one before, and after [`MOST_DROPPED`] dropped ones in a row for as long as it takes.
+//! pictures coming however fast a scene is saved or a slider is dragged: it waits up to `GRACE` for the first picture of
+//! the one before, and after `MOST_DROPPED` dropped ones in a row for as long as it takes.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
