@@ -95,6 +95,16 @@ pub struct Texture {
     pub levels: OnceLock<Vec<Image>>,
 }
 
+impl Texture {
+    /// Whether lookups give the same everywhere; quick where the image is shared.
+    #[must_use]
+    pub fn looks_like(&self, other: &Self) -> bool {
+        self.wrap == other.wrap
+            && self.filter == other.filter
+            && (Arc::ptr_eq(&self.image, &other.image) || self.image == other.image)
+    }
+}
+
 /// A material's use of a texture: which texture, which uv set, and where on it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TextureRef {
