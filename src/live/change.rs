@@ -9,7 +9,7 @@ use crate::plan::{LINE_SLICE, MaterialPlan, Plan};
 use crate::sample::SampleLayout;
 use crate::scene::Scene;
 use crate::scene::ids::MaterialId;
-use crate::scene::settings::LineSettings;
+use crate::scene::settings::{Background, LineSettings};
 use crate::shade::{InputSet, Mode, OutputSet, Shader, Shaders};
 
 /// What must be done again. Grows until it is done.
@@ -165,13 +165,26 @@ fn same_tests(old: View<'_>, new: View<'_>) -> bool {
     tests(old) == tests(new) && overrides(old) == overrides(new)
 }
 
+/// Whether rays that leave the scene see the same.
+fn same_background(old: &Scene, new: &Scene) -> bool {
+    let image = |scene: &Scene| match scene.render().background {
+        Background::Image { texture, .. } => scene.textures().get(texture.index()).cloned(),
+        _ => None,
+    };
+    old.render().background == new.render().background
+        && match (image(old), image(new)) {
+            (Some(a), Some(b)) => a.looks_like(&b),
+            (a, b) => a.is_none() && b.is_none(),
+        }
+}
+
 /// Whether hits of unchanged shaders become the same samples.
 fn same_shading(old: View<'_>, new: View<'_>) -> bool {
     let (a, b) = (old.scene.render(), new.scene.render());
     let groups = |scene: &Scene| -> Vec<_> { scene.objects().iter().map(|object| object.group.clone()).collect() };
     let layout =
         |view: View<'_>| SampleLayout { max_width: 0.0, declared_widths: Vec::new(), ..view.plan.layout.clone() };
-    a.background == b.background
+    same_background(old.scene, new.scene)
         && a.ambient == b.ambient
         && layout(old) == layout(new)
         && old.plan.color == new.plan.color

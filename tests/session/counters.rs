@@ -1,10 +1,13 @@
 //! Counters prove what is not done again.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use tusche::film::Layer;
-use tusche::live::{Event, LivePicture, Session, SessionOptions};
+use tusche::live::{Event, LivePicture, Session, SessionOptions, Setup};
 use tusche::render::RenderOptions;
+use tusche::scene::settings::Background;
+use tusche::scene::texture::{Image, Pixels, Texture, TextureFilter, Wrap};
+use tusche::shade::{Host, Shaders};
 
 use super::Sources;
 use crate::common::render_with;
@@ -192,4 +195,30 @@ fn subscribers_hear_complete_pictures_with_ever_more_samples() {
     });
     let shown: Vec<_> = shown.collect();
     assert_eq!(shown, [(generation, 1, false), (generation, 2, false), (generation, 4, false), (generation, 5, true)]);
+}
+
+#[test]
+fn another_image_behind_the_scene_is_seen() {
+    let desk = Desk::new();
+    let show = |color: [f32; 4]| {
+        let mut builder = desk.sources.scene().into_builder();
+        let image = Image { width: 1, height: 1, pixels: Pixels::Rgba32F { data: vec![color] } };
+        let texture = builder.add_texture(Texture {
+            name: "sky".into(),
+            image: Arc::new(image),
+            wrap: [Wrap::Repeat; 2],
+            filter: TextureFilter::Linear,
+            levels: OnceLock::new(),
+        });
+        builder.render.background = Background::Image { texture, strength: 1.0 };
+        let scene = builder.build().unwrap_or_else(|faults| panic!("{faults}"));
+        let (shaders, _) = Shaders::compile(&scene, &Host::new()).unwrap_or_else(|faults| panic!("{faults}"));
+        desk.session.set_scene(Setup { scene, shaders, layers: vec![Layer::Rgba] });
+        desk.session.render().unwrap_or_else(|faults| panic!("{faults}"))
+    };
+    let first = show([0.1, 0.2, 0.3, 1.0]);
+    let same = show([0.1, 0.2, 0.3, 1.0]);
+    let other = show([0.4, 0.2, 0.3, 1.0]);
+    assert_eq!((same.redone.shaded, same.redone.developed), (0, 0), "{:?}", same.redone);
+    assert!((first.channels[0][0] - 0.1).abs() < 1e-4 && (other.channels[0][0] - 0.4).abs() < 1e-4);
 }
