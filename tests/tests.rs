@@ -24,6 +24,7 @@ mod flicker;
 mod same_bits;
 mod session;
 mod stability;
+mod study;
 mod surfaces;
 mod truth;
 mod why;

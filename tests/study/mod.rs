@@ -1,0 +1,3 @@
+//! What accuracy costs: measures, ladders and reports.
+
+mod flip;
