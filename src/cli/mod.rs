@@ -9,6 +9,7 @@ mod flicker;
 mod render;
 mod request;
 mod shader;
+mod study;
 mod terminal;
 mod why;
 
@@ -58,6 +59,7 @@ pub fn run() -> u8 {
         Command::Explain(arguments) => explain::run(&arguments),
         Command::Why(arguments) => why::run(&arguments),
         Command::Flicker(arguments) => flicker::run(&arguments),
+        Command::Study(arguments) => study::run(&arguments),
         Command::Shader { command } => shader::run(&command),
         Command::Compare(arguments) => compare::run(&arguments),
         Command::Schema => print(&format!("{:#}\n", crate::scene::file::schema())),

@@ -80,9 +80,9 @@ impl Folder {
         let [width, height] = [shot.width, shot.colors.len() / shot.width.max(1)].map(|side| side as u32);
         let picture = image::RgbImage::from_raw(width, height, bytes).unwrap_or_default();
         let mut png = Cursor::new(Vec::new());
-        picture.write_to(&mut png, image::ImageFormat::Png).map_err(|error| {
-            Diagnostic::error(format!("cannot write this picture: {error}")).in_file(&path)
-        })?;
+        picture
+            .write_to(&mut png, image::ImageFormat::Png)
+            .map_err(|error| Diagnostic::error(format!("cannot write this picture: {error}")).in_file(&path))?;
         write_atomically(&path, |sink| sink.write_all(png.get_ref()))
     }
 
@@ -90,7 +90,8 @@ impl Folder {
     #[must_use]
     pub fn reference(&self, scene: &str) -> Option<(Shot, u32, Errors)> {
         let note = std::fs::read(self.file("reference.json")).ok()?;
-        let note: ReferenceNote = serde_json::from_slice(&note).ok().filter(|note: &ReferenceNote| note.scene == scene)?;
+        let note: ReferenceNote =
+            serde_json::from_slice(&note).ok().filter(|note: &ReferenceNote| note.scene == scene)?;
         let picture = Picture::read(&self.file("reference.exr")).ok()?;
         let [r, g, b, line] = ["R", "G", "B", "line"].map(|name| picture.channel(name));
         let (r, g, b, line) = (r?, g?, b?, line?);

@@ -62,11 +62,19 @@ impl Knob {
             Self::Filter => "filter",
         }
     }
+}
 
-    /// The knob of a name.
-    #[must_use]
-    pub fn parse(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|knob| knob.name() == name)
+impl std::str::FromStr for Knob {
+    type Err = String;
+
+    fn from_str(name: &str) -> Result<Self, String> {
+        Self::ALL.into_iter().find(|knob| knob.name() == name).ok_or_else(|| {
+            let names = Self::ALL.map(Self::name);
+            match crate::diag::nearest(name, names.iter().copied()) {
+                Some(near) => format!("there is no knob `{name}`; did you mean `{near}`?"),
+                None => format!("there is no knob `{name}`; knobs are {}", names.join(", ")),
+            }
+        })
     }
 }
 
@@ -227,9 +235,8 @@ impl Ladder {
             return "the scene".to_owned();
         }
         let rungs = self.knobs.iter().find(|rungs| rungs.points.contains(&point));
-        rungs.map_or_else(String::new, |rungs| {
-            format!("{} {}", rungs.knob.name(), self.points[point].value(rungs.knob))
-        })
+        rungs
+            .map_or_else(String::new, |rungs| format!("{} {}", rungs.knob.name(), self.points[point].value(rungs.knob)))
     }
 }
 
@@ -292,7 +299,9 @@ fn rungs(
         counts(depths, own).into_iter().filter(|depth| depth + other <= MOST_DEPTH).collect::<Vec<_>>()
     };
     Ok(match knob {
-        Knob::Samples => counts(&SAMPLES, own.samples).into_iter().map(|samples| Settings { samples, ..*own }).collect(),
+        Knob::Samples => {
+            counts(&SAMPLES, own.samples).into_iter().map(|samples| Settings { samples, ..*own }).collect()
+        }
         Knob::IdealSamples => {
             if (Settings { samples: own.samples, ..*ideal }) == *own {
                 return Err("the scene is as exact as the reference but for its samples");
@@ -391,7 +400,8 @@ impl fmt::Display for Ladder {
             writeln!(f, "{:<20}none: {why}", knob.name())?;
         }
         let ideal = Knob::ALL.into_iter().filter(|knob| {
-            !matches!(knob, Knob::Samples | Knob::IdealSamples) && self.ideal.value(*knob) != self.points[0].value(*knob)
+            !matches!(knob, Knob::Samples | Knob::IdealSamples)
+                && self.ideal.value(*knob) != self.points[0].value(*knob)
         });
         let ideal: Vec<_> = ideal.map(|knob| format!("{} {}", knob.name(), self.ideal.value(knob))).collect();
         let ideal = if ideal.is_empty() { "as the scene, with more samples".to_owned() } else { ideal.join(", ") };

@@ -78,7 +78,12 @@ impl ByRegion {
 
     fn map(self, change: impl Fn(f64) -> f64 + Copy) -> Self {
         let Self { all, lines, reflections, rest } = self;
-        Self { all: change(all), lines: lines.map(change), reflections: reflections.map(change), rest: rest.map(change) }
+        Self {
+            all: change(all),
+            lines: lines.map(change),
+            reflections: reflections.map(change),
+            rest: rest.map(change),
+        }
     }
 }
 
@@ -190,7 +195,10 @@ impl Reference {
             let half = f64::from(self.radius * self.radius - (y - y0) * (y - y0)).sqrt() as i32;
             for x in (x0 - half).max(0)..(x0 + half + 1).min(width) {
                 let ink = f64::from(ink[(y * width + x) as usize]);
-                [f64::from(x - x0), f64::from(y - y0), 1.0].iter().zip(&mut moments).for_each(|(x, sum)| *sum += x * ink);
+                [f64::from(x - x0), f64::from(y - y0), 1.0]
+                    .iter()
+                    .zip(&mut moments)
+                    .for_each(|(x, sum)| *sum += x * ink);
             }
         }
         moments
@@ -223,7 +231,12 @@ mod tests {
             ((x + width / 2.0).min(left + 1.0) - (x - width / 2.0).max(left)).max(0.0)
         };
         let coverage: Vec<f32> = (0..SIDE * SIDE).map(covered).collect();
-        Shot { width: SIDE, colors: coverage.iter().map(|ink| [1.0 - ink; 3]).collect(), coverage, secondary: Vec::new() }
+        Shot {
+            width: SIDE,
+            colors: coverage.iter().map(|ink| [1.0 - ink; 3]).collect(),
+            coverage,
+            secondary: Vec::new(),
+        }
     }
 
     #[test]
@@ -232,7 +245,10 @@ mod tests {
         for moved in [0.0, 0.1, 0.4, 0.8] {
             let position = reference.errors(&line(20.0 + moved, 2.0)).position.unwrap_or(f64::NAN);
             // What leaves the discs of pixels at the line's rim makes it a little less.
-            assert!(position > 0.8 * f64::from(moved) && position < 1.01 * f64::from(moved) + 1e-9, "{moved}: {position}");
+            assert!(
+                position > 0.8 * f64::from(moved) && position < 1.01 * f64::from(moved) + 1e-9,
+                "{moved}: {position}"
+            );
         }
         let missing = reference.errors(&line(500.0, 2.0));
         assert_eq!((missing.position, missing.coverage), (Some(3.0), Some(1.0)));

@@ -2,13 +2,14 @@
 //!
 //! [`study`](run::study) renders a [`Ladder`] of settings for each [`Knob`] that matters to a scene, and compares every
 //! picture with a reference: the scene without approximations, with many samples and seeds of its own. [`measure`] says what
-//! the errors are.
+//! the errors are; [`report`] turns the outcome into a page.
 
 pub mod flicker;
 pub mod flip;
 pub mod folder;
 pub mod ladder;
 pub mod measure;
+pub mod report;
 pub mod run;
 pub mod table;
 

@@ -73,7 +73,7 @@ pub struct StudyControl<'a> {
 }
 
 /// Studies a scene into a folder: `study.csv`, the reference and the pictures. What the folder already holds of the same
-/// scene is not measured again. 
+/// scene is not measured again.
 ///
 /// # Errors
 /// If the scene draws no lines, a script fails, the budget does not reach for the reference and one picture, the folder cannot
@@ -108,10 +108,16 @@ pub fn study(
     let deadline = options.budget.map(|budget| start + budget);
 
     // The scene's own picture tells what all others will take.
-    say(0.0, "the scene");
-    let first = camera.shoot(&ladder.points[0], 0)?;
-    let Some((first_shot, first_stats)) = first else { return Err(stopped()) };
-    let per_sample = first_stats.seconds.total / f64::from(ladder.points[0].samples);
+    let mut first = None;
+    let known_seconds = known.iter().find(|run| run.scene == camera.key && run.is_of(&ladder.points[0]));
+    let per_sample = match known_seconds {
+        Some(run) => run.wall_seconds,
+        None => {
+            say(0.0, "the scene");
+            let Some((shot, stats)) = camera.shoot(&ladder.points[0], 0)? else { return Err(stopped()) };
+            first.insert((shot, stats)).1.seconds.total
+        }
+    } / f64::from(ladder.points[0].samples);
     let (reference, samples, own) = match folder.reference(&camera.key) {
         Some((shot, samples, own)) if options.budget.is_some() || samples == options.reference.max(2) => {
             (Reference::new(shot, lines.widest), samples, own)
@@ -129,7 +135,8 @@ pub fn study(
     folder.keep_picture("reference", reference.shot())?;
 
     let identity = (camera.key.as_str(), samples);
-    let mut runs: Vec<Run> = known.into_iter().filter(|run| run.scene == identity.0 && run.reference == samples).collect();
+    let mut runs: Vec<Run> =
+        known.into_iter().filter(|run| run.scene == identity.0 && run.reference == samples).collect();
     let mut waiting = Vec::new();
     for repeat in 0..options.repeats.max(1) {
         for point in ladder.order() {
@@ -141,18 +148,17 @@ pub fn study(
     }
     let mut done = f64::from(samples);
     let all = done + waiting.iter().map(|(point, _)| f64::from(ladder.points[*point].samples)).sum::<f64>();
-    let mut own_shot = Some((first_shot, first_stats));
     let (mut left_out, mut complete) = (0, true);
     for (point, repeat) in waiting {
         let settings = &ladder.points[point];
         let expected = per_sample * f64::from(settings.samples);
-        let is_first = (point, repeat) == (0, 0);
-        if !is_first && deadline.is_some_and(|deadline| Instant::now() + seconds(expected) > deadline) {
+        let taken = if (point, repeat) == (0, 0) { first.take() } else { None };
+        if taken.is_none() && deadline.is_some_and(|deadline| Instant::now() + seconds(expected) > deadline) {
             left_out += 1;
             continue;
         }
         say(done / all, &ladder.name(point));
-        let shot = if is_first { own_shot.take() } else { camera.shoot(settings, repeat)? };
+        let shot = if taken.is_some() { taken } else { camera.shoot(settings, repeat)? };
         let Some((shot, stats)) = shot else {
             complete = false;
             break;
@@ -166,7 +172,16 @@ pub fn study(
     }
     let of_point = |settings: &Settings| runs.iter().filter(|run| run.is_of(settings)).cloned().collect();
     let runs = ladder.points.iter().map(of_point).collect();
-    Ok(Study { title: options.title.clone(), size: camera.size, ladder, reference: samples, own, runs, left_out, complete })
+    Ok(Study {
+        title: options.title.clone(),
+        size: camera.size,
+        ladder,
+        reference: samples,
+        own,
+        runs,
+        left_out,
+        complete,
+    })
 }
 
 fn stopped() -> Diagnostics {
@@ -215,7 +230,8 @@ pub fn key(scene: &Scene) -> String {
     let mut hash = Fnv(0xcbf2_9ce4_8422_2325);
     // Nothing here can fail.
     let _ = write!(hash, "{} {scene:?}", env!("CARGO_PKG_VERSION"));
-    format!("{:016x}", hash.0)
+    // Never a number to those who read tables.
+    format!("h{:016x}", hash.0)
 }
 
 /// Takes pictures of one scene with changing settings.
@@ -244,7 +260,7 @@ impl Camera<'_> {
         if self.secondary {
             layers.extend([LinePath::Reflection, LinePath::Refraction].map(Layer::LinePath));
         }
-        let mut half = |purpose| self.take(&settings, self.unused_seed(purpose), &layers);
+        let half = |purpose| self.take(&settings, self.unused_seed(purpose), &layers);
         let (Some((a, _)), Some((b, _))) = (half(1)?, half(2)?) else { return Ok(None) };
         let own = Reference::new(a.clone(), widest).errors(&b).scaled(0.5);
         Ok(Some((Shot::mean(&a, &b), own)))

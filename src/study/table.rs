@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
 
 use super::ladder::{Settings, method_name};
 use super::measure::{ByRegion, Errors};
@@ -143,10 +144,24 @@ pub fn read(path: &Path) -> Result<Vec<Run>, Diagnostic> {
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
         Err(error) => return Err(Diagnostic::error(format!("cannot read this file: {error}")).in_file(path)),
     };
-    csv::Reader::from_reader(text.as_slice()).deserialize().collect::<Result<_, _>>().map_err(|error| {
-        let fault = Diagnostic::error(format!("this is no table of a study: {error}")).in_file(path);
-        fault.hint("name another folder, or delete the file: all is then measured anew")
-    })
+    let text = String::from_utf8_lossy(&text);
+    let mut lines = text.lines();
+    let names: Vec<&str> = lines.next().unwrap_or_default().split(',').collect();
+    let runs = lines.enumerate().map(|(line, cells)| {
+        let cells: Vec<&str> = cells.split(',').collect();
+        let run = if cells.len() == names.len() {
+            let row: Map<_, _> =
+                names.iter().zip(cells).map(|(name, cell)| ((*name).to_owned(), value(cell))).collect();
+            serde_json::from_value(row.into()).map_err(|error| error.to_string())
+        } else {
+            Err(format!("{} cells under {} names", cells.len(), names.len()))
+        };
+        run.map_err(|error| {
+            let fault = Diagnostic::error(format!("this is no table of a study: {error} in line {}", line + 2));
+            fault.in_file(path).hint("name another folder, or delete the file: all is then measured anew")
+        })
+    });
+    runs.collect()
 }
 
 /// Writes a table.
@@ -154,11 +169,32 @@ pub fn read(path: &Path) -> Result<Vec<Run>, Diagnostic> {
 /// # Errors
 /// If the file cannot be written.
 pub fn write(path: &Path, runs: &[Run]) -> Result<(), Diagnostic> {
-    let mut writer = csv::Writer::from_writer(Vec::new());
-    let failed = |error: String| Diagnostic::error(format!("cannot write the table: {error}")).in_file(path);
+    let failed = |error: serde_json::Error| Diagnostic::error(format!("cannot write the table: {error}")).in_file(path);
+    let mut text = String::new();
     for run in runs {
-        writer.serialize(run).map_err(|error| failed(error.to_string()))?;
+        // By way of text, so that a float gets its own digits and not those of a double.
+        let row = serde_json::to_string(run).and_then(|row| serde_json::from_str::<Map<String, Value>>(&row));
+        let row = row.map_err(failed)?;
+        if text.is_empty() {
+            text = row.keys().map(String::as_str).collect::<Vec<_>>().join(",") + "\n";
+        }
+        text += &(row.values().map(cell).collect::<Vec<_>>().join(",") + "\n");
     }
-    let bytes = writer.into_inner().map_err(|error| failed(error.to_string()))?;
-    write_atomically(path, |sink| sink.write_all(&bytes))
+    write_atomically(path, |sink| sink.write_all(text.as_bytes()))
+}
+
+/// A value as a cell. There are only numbers, names without commas, and what is not there.
+fn cell(value: &Value) -> String {
+    match value {
+        Value::Null => String::new(),
+        Value::String(name) => name.clone(),
+        other => other.to_string(),
+    }
+}
+
+fn value(cell: &str) -> Value {
+    match cell {
+        "" => Value::Null,
+        cell => serde_json::from_str(cell).unwrap_or_else(|_| cell.into()),
+    }
 }

@@ -1,3 +1,5 @@
 //! What accuracy costs: measures, ladders and reports.
 
+mod course;
 mod flip;
+mod ladder;
