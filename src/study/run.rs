@@ -151,9 +151,11 @@ pub fn study(
     let (mut left_out, mut complete) = (0, true);
     for (point, repeat) in waiting {
         let settings = &ladder.points[point];
-        let expected = per_sample * f64::from(settings.samples);
+        let expected = expected_seconds(&runs, settings.samples);
         let taken = if (point, repeat) == (0, 0) { first.take() } else { None };
-        if taken.is_none() && deadline.is_some_and(|deadline| Instant::now() + seconds(expected) > deadline) {
+        if taken.is_none()
+            && deadline.is_some_and(|deadline| deadline.saturating_duration_since(Instant::now()) < seconds(expected))
+        {
             left_out += 1;
             continue;
         }
@@ -191,6 +193,13 @@ fn stopped() -> Diagnostics {
 
 fn seconds(seconds: f64) -> Duration {
     Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX)
+}
+
+/// How long a picture will surely not take longer than: one of fewer samples takes no longer, and one of more takes at most
+/// as much longer as it has more samples, since some of the time is the same for all.
+fn expected_seconds(runs: &[Run], samples: u32) -> f64 {
+    let longest = |run: &Run| run.wall_seconds * (f64::from(samples) / f64::from(run.samples)).max(1.0);
+    runs.iter().map(longest).fold(f64::INFINITY, f64::min)
 }
 
 /// How many samples the reference gets: what is asked for, or what fits into 40 % of the budget, but at least four times those

@@ -308,10 +308,13 @@ fn tables(study: &Study, summary: &Summary) -> String {
 }
 
 fn cell(mean: Option<Mean>) -> String {
-    mean.map_or_else(
-        || "–".to_owned(),
-        |Mean { mean, deviation }| format!("{} <span class=\"soft\">± {}</span>", number(mean), number(deviation)),
-    )
+    match mean {
+        None => "–".to_owned(),
+        Some(Mean { mean, deviation: 0.0 }) => number(mean),
+        Some(Mean { mean, deviation }) => {
+            format!("{} <span class=\"soft\">± {}</span>", number(mean), number(deviation))
+        }
+    }
 }
 
 fn rows(html: &mut String, study: &Study, summary: &Summary, cells: impl Fn(&Point) -> Vec<String>) {
