@@ -50,6 +50,12 @@ pub fn linear(srgb: [f32; 3]) -> [f32; 3] {
     srgb.map(linear_from_srgb)
 }
 
+/// A linear value as a screen can show it: 0 … 1, NaN as 0.
+#[must_use]
+pub fn shown(value: f32) -> f32 {
+    if value > 0.0 { value.min(1.0) } else { 0.0 }
+}
+
 /// `x` to the power of `y`, for x of at least 0; 0 to the power of 0 is 1.
 fn raised(x: f32, y: f32) -> f32 {
     if x > 0.0 {
@@ -220,8 +226,7 @@ fn xyz_from_linear([r, g, b]: [f32; 3]) -> [f32; 3] {
 
 /// YCxCz, the linear cousin of CIELAB, of a linear colour.
 fn opponent(rgb: [f32; 3]) -> [f32; 3] {
-    // `max` turns NaN into 0.
-    let [x, y, z] = white_relative(xyz_from_linear(rgb.map(|value| value.max(0.0).min(1.0))));
+    let [x, y, z] = white_relative(xyz_from_linear(rgb.map(shown)));
     [116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z)]
 }
 

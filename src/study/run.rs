@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
+use super::flip::shown;
 use super::folder::Folder;
 use super::ladder::{Knob, Ladder, Settings};
 use super::measure::{Errors, Reference, Shot};
@@ -63,13 +64,16 @@ pub struct Study {
     pub complete: bool,
 }
 
+/// Called with the share that is done, 0 … 1, and with what is done next.
+pub type Progress<'a> = &'a (dyn Fn(f64, &str) + Sync);
+
 /// How a caller follows and stops a study.
 #[derive(Default)]
 pub struct StudyControl<'a> {
     /// Once true, the study soon ends with what is there.
     pub cancel: Option<&'a AtomicBool>,
-    /// Called with the share that is done, 0 … 1, and with what is done next.
-    pub progress: Option<&'a (dyn Fn(f64, &str) + Sync)>,
+    /// Follows it.
+    pub progress: Option<Progress<'a>>,
 }
 
 /// Studies a scene into a folder: `study.csv`, the reference and the pictures. What the folder already holds of the same
@@ -316,17 +320,16 @@ impl Camera<'_> {
 
 /// Planes of `rgba`, `line`, and perhaps the lines of two kinds of paths.
 fn shot(width: usize, planes: &[Vec<f32>]) -> Shot {
-    let shown = |i: usize| {
+    let color = |i: usize| {
         let white = 1.0 - planes[3][i];
-        // `max` turns NaN into 0.
-        [0, 1, 2].map(|axis| (planes[axis][i] + white).max(0.0).min(1.0))
+        [0, 1, 2].map(|axis| shown(planes[axis][i] + white))
     };
     let secondary = |reflection: &Vec<f32>, refraction: &Vec<f32>| {
         reflection.iter().zip(refraction).map(|(a, b)| (a + b).min(1.0)).collect()
     };
     Shot {
         width,
-        colors: (0..planes[0].len()).map(shown).collect(),
+        colors: (0..planes[0].len()).map(color).collect(),
         coverage: planes.get(7).cloned().unwrap_or_default(),
         secondary: planes.get(11).zip(planes.get(15)).map(|(a, b)| secondary(a, b)).unwrap_or_default(),
     }

@@ -110,5 +110,5 @@ fn what_is_no_colour_counts_as_one_that_a_screen_can_show() {
     let white = vec![[1.0; 3]; 12];
     assert_eq!(mean_flip(4, &bright, &white), 0.0);
     let broken = vec![[f32::NAN, -3.0, f32::NEG_INFINITY]; 12];
-    assert_eq!(mean_flip(4, &broken, &vec![[0.0; 3]; 12]), 0.0);
+    assert_eq!(mean_flip(4, &broken, &[[0.0; 3]; 12]), 0.0);
 }
