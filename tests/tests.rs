@@ -21,6 +21,7 @@ mod packets;
 mod trace;
 // ... and the whole.
 mod flicker;
+mod live;
 mod same_bits;
 mod session;
 mod stability;

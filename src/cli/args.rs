@@ -20,6 +20,7 @@ use crate::study::Knob;
     after_help = "Start here:\n  \
         tusche render scenes/hello.toml -o hello.png    a small scene\n  \
         tusche render model.glb                         any glTF model, framed and lit\n  \
+        tusche watch scenes/hello.toml                  the same, again after every save\n  \
         tusche explain scenes/hello.toml                what a render would do, and why\n\n\
         Exit codes: 0 done, 1 the scene, a shader or a file failed, 2 bad usage."
 )]
@@ -34,6 +35,8 @@ pub enum Command {
     Render(Box<RenderArguments>),
     /// Prints what a render would do, with reasons, without making a pixel.
     Explain(Box<ExplainArguments>),
+    /// Renders again whenever a file of the scene changes, with a page in the browser.
+    Watch(Box<super::watch::WatchArguments>),
     /// Tells why there is a line at a place of the picture, or why there is none.
     Why(Box<WhyArguments>),
     /// Measures how much lines change from frame to frame beyond what motion explains.

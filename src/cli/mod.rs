@@ -11,6 +11,7 @@ mod request;
 mod shader;
 mod study;
 mod terminal;
+mod watch;
 mod why;
 
 use std::io::Write;
@@ -57,6 +58,7 @@ pub fn run() -> u8 {
     let result = match arguments.command {
         Command::Render(arguments) => render::run(&arguments),
         Command::Explain(arguments) => explain::run(&arguments),
+        Command::Watch(arguments) => watch::run(&arguments),
         Command::Why(arguments) => why::run(&arguments),
         Command::Flicker(arguments) => flicker::run(&arguments),
         Command::Study(arguments) => study::run(&arguments),

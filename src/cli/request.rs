@@ -7,11 +7,12 @@ use super::{Failure, terminal};
 use crate::clock::CpuClock;
 use crate::diag::{Diagnostic, Diagnostics};
 use crate::files::FileStore;
-use crate::film::Layer;
 use crate::plan::Plan;
-use crate::render::{PictureFile, layers_of};
-use crate::scene::{Scene, SceneBuilder, file};
-use crate::shade::{Host, OutputSet, Shaders};
+use crate::render::request::layers_for;
+use crate::render::{LoadedScene, PictureFile, SceneRequest, layers_of};
+use crate::scene::Scene;
+use crate::scene::file::{LoadOptions, Override};
+use crate::shade::Shaders;
 
 /// The picture that the arguments ask for, ready to be rendered.
 pub(super) struct Request {
@@ -28,11 +29,8 @@ impl Request {
     /// Loads, resolves and compiles everything; warnings are printed unless `--quiet`.
     pub fn new(arguments: &SceneArguments, frame: Option<f64>, outputs: &[PathBuf]) -> Result<Self, Failure> {
         let clock = CpuClock::process();
-        let files = FileStore::new();
-        let (builder, mut warnings) = load(arguments, frame, &files)?;
-        let scene = builder.build()?;
-        let (shaders, more) = Shaders::compile_for(&scene, &Host::new(), arguments.shading.mode())?;
-        warnings.extend(more);
+        let request = scene_request(arguments, frame)?;
+        let LoadedScene { scene, shaders, warnings } = request.load(&FileStore::new())?;
         if !arguments.quiet {
             terminal::say(&warnings);
         }
@@ -53,13 +51,19 @@ pub(super) fn output_paths(arguments: &SceneArguments) -> Result<Vec<PathBuf>, F
         let stem = arguments.scene.file_stem().unwrap_or("picture".as_ref());
         return Ok(vec![Path::new(stem).with_extension("png")]);
     }
+    check_outputs(arguments)?;
+    Ok(arguments.output.clone())
+}
+
+/// Whether every output is named once.
+pub(super) fn check_outputs(arguments: &SceneArguments) -> Result<(), Failure> {
     let places: Vec<PathBuf> = arguments.output.iter().map(|path| place(path)).collect();
     for (index, path) in arguments.output.iter().enumerate() {
         if places[..index].contains(&places[index]) {
             return Err(Failure::Usage(format!("`{}` is given twice as output", path.display())));
         }
     }
-    Ok(arguments.output.clone())
+    Ok(())
 }
 
 /// The one spelling of a path by which two names of the same file are known.
@@ -71,11 +75,8 @@ fn place(path: &Path) -> PathBuf {
     path.canonicalize().ok().or_else(named).unwrap_or_else(|| path.to_owned())
 }
 
-fn load(
-    arguments: &SceneArguments,
-    frame: Option<f64>,
-    files: &FileStore,
-) -> Result<(SceneBuilder, Diagnostics), Failure> {
+/// What to load.
+pub(super) fn scene_request(arguments: &SceneArguments, frame: Option<f64>) -> Result<SceneRequest, Failure> {
     // Flags that stand for values of the scene file go the same way as `--set`, so that they are checked the same way.
     let mut changes = arguments.set.clone();
     if let Some(Size([width, height])) = arguments.size {
@@ -88,45 +89,16 @@ fn load(
         changes.push(format!("render.seed={seed}"));
     }
     let mut faults = Diagnostics::default();
-    let parsed =
-        changes.iter().filter_map(|text| file::Override::parse(text).map_err(|fault| faults.extend(fault)).ok());
+    let parsed = changes.iter().filter_map(|text| Override::parse(text).map_err(|fault| faults.extend(fault)).ok());
     let overrides: Vec<_> = parsed.collect();
     if faults.has_errors() {
         return Err(faults.into());
     }
-    let options = file::LoadOptions { frame, camera: arguments.camera.clone() };
-    let (mut builder, warnings) = file::load(&arguments.scene, files, &overrides, &options)?;
-    builder.lines.enabled &= arguments.lines != LineMode::Off;
-    Ok((builder, warnings))
-}
-
-/// The layers of an output: those asked for, or a PNG's `rgba` and everything but parts of others (`line.TYPE`, `line.PATH`, `below`) for an EXR.
-fn layers_for(path: &Path, asked: &[String], scene: &Scene, shaders: &Shaders) -> Result<Vec<Layer>, Diagnostic> {
-    let is_exr = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("exr"));
-    let aovs = shaders.aovs();
-    if !asked.is_empty() {
-        let shown = if is_exr { asked } else { &asked[..1] };
-        return shown.iter().map(|name| Layer::parse(name, aovs)).collect();
-    }
-    if !is_exr {
-        return Ok(vec![Layer::Rgba]);
-    }
-    let mut layers = vec![
-        Layer::Rgba,
-        Layer::Color,
-        Layer::Line,
-        Layer::Depth,
-        Layer::Normal,
-        Layer::Position,
-        Layer::Uv,
-        Layer::Object,
-    ];
-    if scene.lines().hidden.is_some() {
-        layers.push(Layer::HiddenLine);
-    }
-    if shaders.iter().any(|shader| shader.analysis().output(OutputSet::FEATURE).may) {
-        layers.push(Layer::Feature);
-    }
-    layers.extend(aovs.iter().enumerate().map(|(index, name)| Layer::Aov(index, name.clone())));
-    Ok(layers)
+    Ok(SceneRequest {
+        path: arguments.scene.clone(),
+        overrides,
+        options: LoadOptions { frame, camera: arguments.camera.clone() },
+        lines: arguments.lines != LineMode::Off,
+        shading: arguments.shading.mode(),
+    })
 }

@@ -15,6 +15,7 @@ pub mod output;
 pub mod picture;
 mod png;
 mod spread;
+pub mod view;
 
 pub use atomic::{check_writable, write_atomically};
 pub use compare::{Comparison, compare, write_difference};
@@ -23,3 +24,4 @@ pub use filter::Filter;
 pub use layer::{Channel, ChannelFormat, FilmTile, Layer, LinePath};
 pub use output::{Output, OutputSettings};
 pub use picture::Picture;
+pub use view::View;

@@ -81,7 +81,7 @@ impl Output {
     /// If the disk is full or gone. From then on every call gives the same error.
     pub fn write(&self, tile: &FilmTile) -> Result<(), Diagnostic> {
         self.check(tile)?;
-        let planes = self.format.planes(&tile.channels);
+        let planes = self.format.planes(tile);
         let full = self.with_blocks(|blocks| {
             blocks.put(tile.rect, &planes).map_err(|_| self.bug("some pixels were written twice"))
         })?;
@@ -175,10 +175,10 @@ impl Format {
         }
     }
 
-    fn planes(&self, channels: &[Vec<f32>]) -> Vec<Vec<u8>> {
+    fn planes(&self, tile: &FilmTile) -> Vec<Vec<u8>> {
         match self {
-            Self::Exr(exr) => exr.planes(channels),
-            Self::Png(png) => vec![png.pixels(channels)],
+            Self::Exr(exr) => exr.planes(&tile.channels),
+            Self::Png(png) => vec![png.pixels(tile)],
         }
     }
 

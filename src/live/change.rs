@@ -160,7 +160,7 @@ fn same_sampling(old: &Scene, new: &Scene) -> bool {
 
 /// Whether the tests of the line pass are the same, for every material.
 fn same_tests(old: View<'_>, new: View<'_>) -> bool {
-    let overrides = |view: View<'_>| -> Vec<_> { view.scene.materials().iter().map(|m| m.lines.clone()).collect() };
+    let overrides = |view: View<'_>| -> Vec<_> { view.scene.materials().iter().map(|m| m.lines).collect() };
     let tests = |view: View<'_>| view.plan.lines.as_ref().map(|lines| lines.tests.clone());
     tests(old) == tests(new) && overrides(old) == overrides(new)
 }
@@ -236,6 +236,9 @@ fn compare_material(redo: &mut Redo, id: MaterialId, (a, old): (&Shader, View<'_
         && !b.may_fail(LINE_SLICE);
     if restylable {
         redo.restyle.insert(id);
+    } else if new.plan.bodies.contains(&true) && after.refracts {
+        // Rays that start in it, or pass it where another body outranks it, have no hit there.
+        redo.shade = true;
     } else {
         redo.shade_materials.insert(id);
     }

@@ -276,6 +276,7 @@ impl Stages {
         let sampled: Vec<(usize, Sampled)> = self
             .tiles
             .par_iter_mut()
+            .with_max_len(1)
             .enumerate()
             .filter(|(_, tile)| !tile.redo.is_nothing())
             .filter_map(|(index, tile)| {
@@ -313,6 +314,7 @@ impl Stages {
         // Lines.
         let found: Vec<(usize, Found)> = (0..self.tiles.len())
             .into_par_iter()
+            .with_max_len(1)
             .filter(|index| self.tiles[*index].lines_due)
             .filter_map(|index| {
                 if cancelled() || self.tiles.iter().any(|tile| tile.samples.is_none()) {
@@ -346,6 +348,7 @@ impl Stages {
         // Film.
         let developed: Vec<(usize, FilmTile, f64)> = (0..self.tiles.len())
             .into_par_iter()
+            .with_max_len(1)
             .filter(|index| self.tiles[*index].film_due)
             .filter_map(|index| {
                 if cancelled() || self.tiles.iter().any(|tile| tile.samples.is_none() || tile.lines_due) {

@@ -11,7 +11,7 @@ use crate::film::{FilmTile, Layer, Output, OutputSettings};
 use crate::plan::Plan;
 use crate::sample::PixelRect;
 use crate::scene::Scene;
-use crate::scene::settings::Background;
+use crate::scene::settings::{Background, RenderSettings};
 use crate::shade::Shaders;
 
 /// A picture file to write.
@@ -46,11 +46,15 @@ pub fn render_files(
     control: &Control<'_>,
 ) -> Result<Report, Diagnostic> {
     let start = Instant::now();
-    let outputs = files.iter().map(|file| Part::open(scene, plan, file, options)).collect::<Result<Vec<_>, _>>()?;
+    let settings = scene.render();
+    let picture = PixelRect::of_size(settings.size);
+    let crop = options.crop.map_or(picture, |crop| crop.intersection(&picture));
+    let outputs =
+        files.iter().map(|file| Part::open(settings, &plan.layers, file, crop)).collect::<Result<Vec<_>, _>>()?;
     let begun = AtomicBool::new(false);
     let mut report = render(scene, shaders, plan, options, control, &|tile| {
         begun.store(true, Ordering::Relaxed);
-        outputs.iter().try_for_each(|part| part.output.write(&part.of(tile)))
+        outputs.iter().try_for_each(|part| part.output.write(&part.of(tile.rect, &tile.channels)))
     })?;
     let finish = CpuClock::thread();
     report.written = report.complete || begun.into_inner();
@@ -62,39 +66,62 @@ pub fn render_files(
     Ok(report)
 }
 
-/// An open file, and which of the plan's channels go into it.
+/// Writes a finished picture into a file; it appears whole or not at all. `layers` are those of the picture, and
+/// `channels` the channels of all of them for the whole of it, row by row.
+///
+/// # Errors
+/// If the file cannot be written, or one of its layers is not among the picture's; a file that was there before is then
+/// untouched.
+pub fn write_picture(
+    file: &PictureFile,
+    settings: &RenderSettings,
+    layers: &[Layer],
+    channels: &[Vec<f32>],
+) -> Result<(), Diagnostic> {
+    let whole = PixelRect::of_size(settings.size);
+    let part = Part::open(settings, layers, file, whole)?;
+    part.output.write(&part.of(whole, channels))?;
+    part.output.finish()
+}
+
+/// An open file, and which of the picture's channels go into it.
 struct Part {
     output: Output,
     channels: Vec<usize>,
 }
 
 impl Part {
-    fn open(scene: &Scene, plan: &Plan, file: &PictureFile, options: &RenderOptions) -> Result<Self, Diagnostic> {
+    fn open(
+        settings: &RenderSettings,
+        layers: &[Layer],
+        file: &PictureFile,
+        crop: PixelRect,
+    ) -> Result<Self, Diagnostic> {
         let mut channels = Vec::new();
         for layer in &file.layers {
-            let Some(place) = plan.layers.iter().position(|known| known == layer) else {
+            let Some(place) = layers.iter().position(|known| known == layer) else {
                 return Err(Diagnostic::error(format!("the plan does not make layer `{layer}`")).in_file(&file.path));
             };
-            let first: usize = plan.layers[..place].iter().map(|known| known.channels().len()).sum();
+            let first: usize = layers[..place].iter().map(|known| known.channels().len()).sum();
             channels.extend(first..first + layer.channels().len());
         }
-        let render = scene.render();
-        let picture = PixelRect::of_size(render.size);
         let output = Output::create(OutputSettings {
             path: file.path.clone(),
-            size: render.size,
-            crop: options.crop.map_or(picture, |crop| crop.intersection(&picture)),
+            size: settings.size,
+            crop,
             layers: file.layers.clone(),
             png_layer: file.layers.first().cloned().unwrap_or(Layer::Rgba),
-            transparent: render.background == Background::Transparent,
-            metadata: vec![("samples".into(), render.samples.to_string()), ("seed".into(), render.seed.to_string())],
+            transparent: settings.background == Background::Transparent,
+            metadata: vec![
+                ("samples".into(), settings.samples.to_string()),
+                ("seed".into(), settings.seed.to_string()),
+            ],
         })?;
         Ok(Self { output, channels })
     }
 
-    /// The channels of a tile that belong into this file.
-    fn of(&self, tile: &FilmTile) -> FilmTile {
-        let channels = self.channels.iter().map(|channel| tile.channels[*channel].clone()).collect();
-        FilmTile { rect: tile.rect, channels }
+    /// The channels of a rectangle that belong into this file.
+    fn of(&self, rect: PixelRect, channels: &[Vec<f32>]) -> FilmTile {
+        FilmTile { rect, channels: self.channels.iter().map(|channel| channels[*channel].clone()).collect() }
     }
 }

@@ -7,6 +7,7 @@
 
 mod files;
 mod grid;
+pub mod request;
 mod scripts;
 pub mod stats;
 mod totals;
@@ -16,7 +17,8 @@ pub(crate) use grid::Grid;
 pub(crate) use scripts::ScriptedLines;
 pub(crate) use totals::Totals;
 
-pub use files::{PictureFile, layers_of, render_files};
+pub use files::{PictureFile, layers_of, render_files, write_picture};
+pub use request::{LoadedScene, SceneRequest};
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
@@ -218,7 +220,9 @@ impl<'a> Render<'a> {
                 jobs.extend(strip(line_lag).into_iter().map(Job::Line));
             }
             jobs.extend(strip(film_lag).into_iter().map(Job::Develop));
-            let products = jobs.into_par_iter().map(|job| self.work(job, emit)).collect::<Result<Vec<_>, _>>()?;
+            // One by one: rayon would else give one thread a run of samples, which take longest, and share too late.
+            let products =
+                jobs.into_par_iter().with_max_len(1).map(|job| self.work(job, emit)).collect::<Result<Vec<_>, _>>()?;
             for product in products {
                 match product {
                     Some(product) => self.take(product),

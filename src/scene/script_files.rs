@@ -124,11 +124,10 @@ fn texture(
                 let fault = with_nearest(Diagnostic::error(message), &path, &["png", "jpg", "jpeg", "hdr", "exr"]);
                 place(fault, request.span.clone())
             })?;
-            let decoded = texture::decode(&path, &bytes, srgb).map_err(|fault| {
+            let image = texture::read_image(&path, &bytes, srgb, files).map_err(|fault| {
                 let message = format!("{}: {}", path.display(), fault.message);
                 place(Diagnostic { message, ..fault }, request.span.clone())
             })?;
-            let image = Arc::new(decoded);
             images.push((path, srgb, Arc::clone(&image)));
             image
         }

@@ -12,6 +12,7 @@ use image::{DynamicImage, ImageReader};
 
 use super::ids::TextureId;
 use crate::diag::Diagnostic;
+use crate::files::FileStore;
 use crate::math::{Affine2, Vec2, Vec4, linear_from_srgb, portable};
 
 /// The largest width or height of an image, in pixels.
@@ -92,6 +93,16 @@ pub struct Texture {
     pub filter: TextureFilter,
     /// Smaller images, each half as large as the one before; made when first looked up.
     pub levels: OnceLock<Vec<Image>>,
+}
+
+impl Texture {
+    /// Whether lookups give the same everywhere; quick where the image is shared.
+    #[must_use]
+    pub fn looks_like(&self, other: &Self) -> bool {
+        self.wrap == other.wrap
+            && self.filter == other.filter
+            && (Arc::ptr_eq(&self.image, &other.image) || self.image == other.image)
+    }
 }
 
 /// A material's use of a texture: which texture, which uv set, and where on it.
@@ -294,6 +305,15 @@ pub(super) fn between(a: f32, b: f32, t: f32) -> f32 {
 /// [`between`] of each channel.
 fn between_pixels(a: Vec4, b: Vec4, t: f32) -> Vec4 {
     Vec4::from_array(std::array::from_fn(|channel| between(a[channel], b[channel], t)))
+}
+
+/// The image of a file's bytes, which is decoded only if `files` does not know it already.
+///
+/// # Errors
+/// As [`decode`].
+pub fn read_image(path: &Path, bytes: &Arc<[u8]>, srgb: bool, files: &FileStore) -> Result<Arc<Image>, Diagnostic> {
+    let encoding = if srgb { "sRGB" } else { "linear" };
+    files.make((path, encoding), bytes, |bytes| decode(path, bytes, srgb))
 }
 
 /// Decodes a PNG, JPEG, Radiance HDR or OpenEXR image; the content tells which, not the name.

@@ -12,7 +12,7 @@ use super::library::ParameterRecord;
 use super::line::LineShader;
 use super::names::{InputSet, OutputSet, PairSet};
 use super::native::NativeFunction;
-use super::params::{self, Params};
+use super::params::{self, Params, Value};
 use super::script::{Entry, Program};
 use crate::diag::{Diagnostic, Diagnostics};
 use crate::scene::Scene;
@@ -61,6 +61,7 @@ pub struct Shader {
     name: String,
     analysis: Analysis,
     params: Params,
+    defaults: Params,
     pub(super) program: Arc<Program>,
     pub(super) record: ParameterRecord,
     /// The kernel, or why there is none; `None` if the interpreter was asked for.
@@ -99,6 +100,21 @@ impl Shader {
     #[must_use]
     pub fn params(&self) -> &Params {
         &self.params
+    }
+
+    /// What a parameter is where its material says nothing.
+    #[must_use]
+    pub fn default_of(&self, parameter: &str) -> Option<&Value> {
+        self.defaults.0.get(parameter)
+    }
+
+    /// The comment that stands behind a parameter in `params()`, on the same line.
+    #[must_use]
+    pub fn note_of(&self, parameter: &str) -> Option<String> {
+        let span = self.program.key_span(parameter)?;
+        let line = span.source.text.get(span.range.end..)?.lines().next()?;
+        let (_, note) = line.split_once("//")?;
+        Some(note.trim().to_owned())
     }
 
     /// How it is run.
@@ -243,7 +259,7 @@ impl Shaders {
             .map(|script| {
                 keep(Program::parse(&script.source, scene.script_files(), &words).and_then(|program| {
                     let defaults = params::defaults(&program, &program.defaults(&engine)?)?;
-                    Ok((Arc::new(program), defaults))
+                    Ok((Arc::new(program), Params(Arc::new(defaults))))
                 }))
             })
             .collect();
@@ -255,7 +271,7 @@ impl Shaders {
             let sets = scene.attributes().of_material(MaterialId::from_index(index));
             let attributes: Vec<_> = sets.keys().map(|set| &scene.attributes().sets()[*set as usize]).collect();
             let Some((program, defaults)) = &scripts[material.script.index()] else { continue };
-            match params::resolve(defaults.clone(), material, program) {
+            match params::resolve((*defaults.0).clone(), material, program) {
                 Ok(params) => {
                     let analyse = |entry, attributes: &[&AttributeSet]| {
                         analysis::analyse_program(program, entry, &params, scene.textures(), attributes)
@@ -280,6 +296,7 @@ impl Shaders {
                         analysis,
                         record: ParameterRecord::new(&params, scene.textures()),
                         params,
+                        defaults: defaults.clone(),
                         program: Arc::clone(program),
                         kernel: None,
                         line: line.map(|line| {
@@ -316,7 +333,7 @@ impl Shaders {
         if faults.has_errors() {
             return Err(faults);
         }
-        let parameters = scripts.iter().flatten().flat_map(|(_, defaults)| defaults.keys().cloned()).collect();
+        let parameters = scripts.iter().flatten().flat_map(|(_, defaults)| defaults.0.keys().cloned()).collect();
         let aovs = extra_outputs(&shaders);
         let textures = scene.textures().to_vec();
         Ok((Self { shaders, aovs, host: host.clone(), mode, parameters, textures }, faults))

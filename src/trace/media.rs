@@ -20,7 +20,7 @@ use super::ray_tree::{Run, WaveHit, WaveRay};
 use super::surface::Surface;
 use super::triangle::Ray;
 use super::wave::{TileTracer, TraceContext, Work};
-use super::world::Hit;
+use super::world::{Hit, world_box};
 use crate::math::Vec3;
 use crate::scene::ids::{MaterialId, ObjectId};
 use crate::scene::settings::RayKinds;
@@ -212,11 +212,12 @@ impl TileTracer<'_> {
         let priority = |hit: &Hit| self.scene.materials()[self.world.material(hit).index()].dielectric_priority;
         entries.sort_by_key(priority);
         match entries.get(from.counted as usize..).unwrap_or(&[]) {
-            [] => match (exit, thin.or(unknown)) {
-                (Some(exit), _) => see(exit, Pass::Bends, behind, false),
-                (None, Some(hit)) if hit.front || thin.is_some() => see(hit, Pass::Thin, behind, false),
-                (None, Some(hit)) => Some(Seen { error: self.spread(ray, &hit, &at), hit, ..plain }),
-                (None, None) => {
+            [] => match (exit, thin, unknown) {
+                (Some(exit), ..) => see(exit, Pass::Bends, behind, false),
+                (None, Some(sheet), _) => see(sheet, Pass::Thin, behind, false),
+                // As if it had been entered somewhere.
+                (None, None, Some(hit)) => Some(Seen { error: self.spread(ray, &hit, &at), hit, ..plain }),
+                (None, None, None) => {
                     *from = from.going_on(&last, media.len());
                     media.push(behind);
                     None
@@ -261,9 +262,20 @@ impl TileTracer<'_> {
     }
 
     /// Finds the bodies in which camera rays start.
-    pub(super) fn start_in_media(&self, run: &mut Run, context: &mut TraceContext<'_>, work: &mut Work) {
-        let bodies: SmallVec<[ObjectId; 8]> =
-            self.plan.bodies.iter().zip(0..).filter(|(body, _)| **body).map(|(_, id)| ObjectId(id)).collect();
+    pub(super) fn start_in_media(&self, run: &mut Run, context: &mut TraceContext<'_>, work: &mut Work<'_>) {
+        let starts = run
+            .next
+            .iter()
+            .fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), ray| (low.min(ray.origin), high.max(ray.origin)));
+        let may_hold_one = |id: &ObjectId| {
+            let bounds = world_box(self.world.object(*id));
+            bounds.is_some_and(|b| Vec3::from(b.min).cmple(starts.1).all() && Vec3::from(b.max).cmpge(starts.0).all())
+        };
+        let bodies = self.plan.bodies.iter().zip(0..).filter(|(body, _)| **body).map(|(_, id)| ObjectId(id));
+        let bodies: SmallVec<[ObjectId; 8]> = bodies.filter(may_hold_one).collect();
+        if bodies.is_empty() {
+            return;
+        }
         let mut known: Option<(Vec3, u32)> = None;
         for index in 0..run.next.len() {
             let WaveRay { origin, node, .. } = run.next[index];
@@ -284,7 +296,7 @@ impl TileTracer<'_> {
         bodies: &[ObjectId],
         run: &mut Run,
         context: &mut TraceContext<'_>,
-        work: &mut Work,
+        work: &mut Work<'_>,
     ) -> u32 {
         let mut ends: SmallVec<[(Hit, Ray); 4]> = bodies.iter().filter_map(|id| self.end_of(*id, origin)).collect();
         if ends.is_empty() {
@@ -334,10 +346,15 @@ impl TileTracer<'_> {
     }
 
     /// The body whose surface was met, as its shader says; `None` if no light passes there.
-    fn body_at(&self, hit: &WaveHit, run: &mut Run, context: &mut TraceContext<'_>, work: &mut Work) -> Option<Body> {
+    fn body_at(
+        &self,
+        hit: &WaveHit,
+        run: &mut Run,
+        context: &mut TraceContext<'_>,
+        work: &mut Work<'_>,
+    ) -> Option<Body> {
         let material = hit.material;
-        let lights = self.shade(std::slice::from_ref(hit), run, context, work);
-        drop(lights);
+        self.shade(std::slice::from_ref(hit), run, false, context, work);
         let outputs = self.outputs_of(material, 0, context);
         let opacity = self.opacity(outputs);
         (opacity > 0.0).then(|| self.body(hit, &self.bsdf(hit, outputs, 1.0))).flatten()
@@ -347,6 +364,58 @@ impl TileTracer<'_> {
     pub(super) fn body(&self, hit: &WaveHit, bsdf: &crate::shade::Bsdf) -> Option<Body> {
         let passes = bsdf.transmission > 0.0 && bsdf.metallic < 1.0;
         let priority = self.scene.materials()[hit.material.index()].dielectric_priority;
-        passes.then(|| Body { key: (hit.hit.object, hit.material), priority, ior: bsdf.ior })
+        passes.then_some(Body { key: (hit.hit.object, hit.material), priority, ior: bsdf.ior })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn body(object: u32, priority: i32, ior: f32) -> Body {
+        Body { key: (ObjectId(object), MaterialId(0)), priority, ior }
+    }
+
+    fn index(media: &Media) -> f32 {
+        media.settled().index
+    }
+
+    #[test]
+    fn the_body_entered_last_fills_the_space_unless_another_outranks_it() {
+        let mut media = Media::AIR;
+        assert_eq!(index(&media), 1.0);
+        media.enter(body(1, 0, 1.5));
+        media.enter(body(2, 0, 1.33));
+        assert_eq!(index(&media), 1.33);
+        media.enter(body(3, 1, 1.8));
+        media.enter(body(4, 0, 1.1));
+        assert_eq!(index(&media), 1.8);
+        // In whichever order they are left.
+        assert!(media.leave((ObjectId(2), MaterialId(0))) && !media.leave((ObjectId(2), MaterialId(0))));
+        assert!(media.leave((ObjectId(3), MaterialId(0))));
+        assert_eq!(index(&media), 1.1);
+        // Where it has another material.
+        assert!(media.leave((ObjectId(4), MaterialId(7))));
+        assert_eq!(index(&media), 1.5);
+    }
+
+    #[test]
+    fn a_body_entered_twice_is_left_twice() {
+        let mut media = Media::AIR;
+        let key = body(1, 0, 1.5).key;
+        media.enter(body(1, 0, 1.5));
+        media.enter(body(1, 0, 1.5));
+        assert!(media.leave(key) && media.holds(key.0) && media.leave(key) && !media.holds(key.0));
+    }
+
+    #[test]
+    fn of_too_many_bodies_those_of_the_least_priority_are_forgotten() {
+        let mut media = Media::AIR;
+        media.enter(body(0, -1, 2.0));
+        for object in 1..=MOST_BODIES as u32 {
+            media.enter(body(object, object as i32, 1.0 + object as f32));
+        }
+        assert!(!media.holds(ObjectId(0)) && media.holds(ObjectId(1)));
+        assert_eq!(index(&media), 1.0 + MOST_BODIES as f32);
     }
 }

@@ -38,7 +38,7 @@ impl TileTracer<'_> {
     ) {
         let Some(material) = group.first().map(|hit| hit.material) else { return };
         let plan = &self.plan.materials[material.index()];
-        let lights = self.shade(group, run, context, work);
+        let lights = self.shade(group, run, true, context, work);
         let lights_per_hit = if plan.lights { self.lighting.len() } else { 0 };
         for (index, hit) in group.iter().enumerate() {
             let outputs = self.outputs_of(material, index, context);
@@ -48,17 +48,19 @@ impl TileTracer<'_> {
     }
 
     /// Runs the shader of hits of one material, of which there is at least one; returns what lights give them, if anybody asks.
+    /// The run's record learns of it if they are those of their nodes.
     pub(super) fn shade(
         &self,
         group: &[WaveHit],
         run: &mut Run,
+        of_nodes: bool,
         context: &mut TraceContext<'_>,
         work: &mut Work<'_>,
     ) -> Vec<LightSample> {
         let Some(material) = group.first().map(|hit| hit.material) else { return Vec::new() };
         let plan = &self.plan.materials[material.index()];
         let lights = if plan.lights {
-            self.light_samples(group, &run.nodes, Some(&mut run.record), context, work)
+            self.light_samples(group, &run.nodes, of_nodes.then_some(&mut run.record), context, work)
         } else {
             Vec::new()
         };

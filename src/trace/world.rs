@@ -251,7 +251,7 @@ impl World {
 }
 
 /// The box of an object, relative to the camera, grown by the rounding of its transform.
-fn world_box(object: &PlacedObject) -> Option<Aabb> {
+pub(super) fn world_box(object: &PlacedObject) -> Option<Aabb> {
     let (low, high) = object.tree.bounds()?;
     let center = (low + high) * 0.5;
     let half = (high - low) * 0.5;

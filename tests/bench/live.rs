@@ -1,4 +1,4 @@
-//! From an edit to its picture: `cargo bench --bench live [-- SCENE] [--size WxH] [--samples N] [--edits N]`.
+//! From an edit to its picture: `cargo bench --bench live [-- SCENE] [--size WxH] [--samples N] [--edits N] [--edit WORD]`.
 //!
 //! Scene and scripts are held in memory and read anew at every edit, as `tusche watch` does after a save. The figures are
 //! medians in milliseconds from the edit to the complete picture, beside a fresh render of the same picture.
@@ -80,7 +80,8 @@ fn main() {
         "{:<28} {:>8} {:>10} {:>8} {:>8} {:>8}   traced shaded restyled lined developed of tiles",
         "edit", "ms", "first, ms", "load", "fresh", "fresh/ms"
     );
-    for case in cases {
+    let word = value("--edit", "");
+    for case in cases.into_iter().filter(|case| case.name.contains(&word)) {
         let text = std::fs::read_to_string(&case.file).unwrap_or_default();
         if !text.contains(case.old) {
             println!("{:<28} `{}` is not in {}", case.name, case.old, case.file.display());
@@ -116,11 +117,13 @@ fn main() {
             // The first picture may have come earlier than the final one; its own clock tells when.
             let first: Option<std::sync::Arc<LivePicture>> = events.try_iter().find_map(shown);
             firsts.push(first.map_or(0.0, |picture| picture.stats.seconds.total) + loads[n]);
-            let start = Instant::now();
-            let other = session(false);
-            other.set_scene(load(n));
-            let _ = other.render();
-            fresh.push(start.elapsed().as_secs_f64());
+            if !arguments.iter().any(|argument| argument == "--fresh-once") || n == 0 {
+                let start = Instant::now();
+                let other = session(false);
+                other.set_scene(load(n));
+                let _ = other.render();
+                fresh.push(start.elapsed().as_secs_f64());
+            }
         }
         let [time, first, load, fresh] = [times, firsts, loads, fresh].map(median);
         let done = &last.redone;

@@ -190,7 +190,7 @@ fn rate(pool: &rayon::ThreadPool, rays: &[RayStart], trace: &(dyn Fn(&[RayStart]
     let clock = CpuClock::process();
     let mut traced = 0;
     while clock.seconds() < PASS * threads {
-        black_box(pool.install(|| rays.par_chunks(BATCH).map(trace).sum::<usize>()));
+        black_box(pool.install(|| rays.par_chunks(BATCH).with_max_len(1).map(trace).sum::<usize>()));
         traced += rays.len();
     }
     traced as f64 / (clock.seconds() / threads) * 1e-6

@@ -366,6 +366,7 @@ fn extras_name_a_shader_with_parameters() {
             "style": "wet", "noise": { "texture": "red.png", "srgb": false, "wrap": "clamp", "filter": "nearest" },
         },
         "priority": -2,
+        "dielectric_priority": 3,
     });
     // Some exporters can write texts only.
     for extras in [record.clone(), Value::String(record.to_string())] {
@@ -379,7 +380,7 @@ fn extras_name_a_shader_with_parameters() {
         let script = &scene.scripts[material.script.index()];
         assert_eq!(script.path.as_deref(), Some(Path::new("looks/ink.rhai")));
         assert_eq!(script.source.text, "fn surface(hit, p) { #{} }");
-        assert_eq!(material.priority, Some(-2));
+        assert_eq!((material.priority, material.dielectric_priority), (Some(-2), 3));
         let mut params = params(material);
         let noise = &scene.textures[texture(params.remove("noise").unwrap()).texture.index()];
         assert_eq!((noise.wrap, noise.filter), ([Wrap::Clamp; 2], TextureFilter::Nearest));

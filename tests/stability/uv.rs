@@ -56,11 +56,12 @@ fn seam_and_poles() -> f64 {
         let object = world.object(hit.object);
         let uv = surface.uv(object, &hit, 0);
         let on_sphere = turn.inverse().transform_vector3(surface.position + world.origin.as_vec3()).as_dvec3();
-        let v = on_sphere.y.clamp(-1.0, 1.0).acos() / std::f64::consts::PI;
+        let from_axis = on_sphere.x.hypot(on_sphere.z);
+        let v = from_axis.atan2(on_sphere.y) / std::f64::consts::PI;
         let u = (-on_sphere.x).atan2(-on_sphere.z) / std::f64::consts::TAU;
         let off = (f64::from(uv.x) - u).rem_euclid(1.0);
-        // Within a triangle u may be off by what the triangle covers; at a pole it can be anything.
-        let right_u = off.min(1.0 - off) <= 1.01 / f64::from(AROUND) || on_sphere.x.hypot(on_sphere.z) < 1e-6;
+        // Within a triangle u may be off by what the triangle covers; so near to a pole that positions round it can be anything.
+        let right_u = off.min(1.0 - off) <= 1.01 / f64::from(AROUND) || from_axis < 1e-4;
         let in_range = (0.0..=1.0).contains(&uv.x) && (0.0..=1.0).contains(&uv.y);
         let tangent = surface.tangent(object, &hit).truncate();
         let usable = tangent.is_normalized() && tangent.dot(surface.normal).abs() < 1e-5;

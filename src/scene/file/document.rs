@@ -84,6 +84,20 @@ impl Node {
         entry.map_or_else(|| self.span.clone(), |entry| entry.key_span.clone())
     }
 
+    /// The same as JSON, which knows no places.
+    pub fn to_json(&self) -> serde_json::Value {
+        match &self.value {
+            Value::Bool(value) => (*value).into(),
+            Value::Int(value) => (*value).into(),
+            Value::Float(value) => (*value).into(),
+            Value::String(text) | Value::Datetime(text) => text.as_str().into(),
+            Value::Array(items) => items.iter().map(Self::to_json).collect(),
+            Value::Table(table) => {
+                table.entries.iter().map(|entry| (entry.key.clone(), entry.node.to_json())).collect()
+            }
+        }
+    }
+
     /// The string that this node is, if it is one.
     pub fn as_str(&self) -> Option<&str> {
         match &self.value {

@@ -52,20 +52,39 @@ pub fn load(
     overrides: &[Override],
     options: &LoadOptions,
 ) -> Result<(SceneBuilder, Diagnostics), Diagnostics> {
+    let (source, is_written) = source_of(path, files)?;
+    load_document(&source, path, files, overrides, options, is_written)
+}
+
+/// The text of a scene file, or the one that a bare model stands for, and whether a user wrote it.
+fn source_of(path: &Path, files: &FileStore) -> Result<(Arc<Source>, bool), Diagnostic> {
     let extension = path.extension().map(|extension| extension.to_string_lossy().to_lowercase());
-    let source = match extension.as_deref() {
-        Some("toml") => files.read_text(path)?,
+    match extension.as_deref() {
+        Some("toml") => Ok((files.read_text(path)?, true)),
         Some("gltf" | "glb") => {
             files.read(path)?;
-            model_scene(path)?
+            Ok((model_scene(path)?, false))
         }
         _ => {
             let fault = Diagnostic::error("this is neither a scene file nor a model").in_file(path);
-            return Err(fault.hint("scene files end in .toml, models in .gltf or .glb").into());
+            Err(fault.hint("scene files end in .toml, models in .gltf or .glb"))
         }
-    };
-    let is_written = extension.as_deref() == Some("toml");
-    load_document(&source, path, files, overrides, options, is_written)
+    }
+}
+
+/// What a scene file says, with overrides put in: its tables as written, neither checked nor completed. A bare model gives
+/// the scene file that it stands for. Numbers that JSON does not know are null.
+///
+/// # Errors
+/// If the file cannot be read or is no TOML, or an override has no place in it.
+pub fn written(path: &Path, files: &FileStore, overrides: &[Override]) -> Result<serde_json::Value, Diagnostics> {
+    let (source, _) = source_of(path, files)?;
+    let mut document = document::parse(&source)?;
+    let schema = schema();
+    for change in overrides {
+        change.place(&mut document, &schema)?;
+    }
+    Ok(document.to_json())
 }
 
 /// Reads a bare shader as a scene: a ball and a knot of it on a stage, which `tusche shader preview` shows. The path may

@@ -25,7 +25,15 @@ impl Override {
     /// # Errors
     /// If there is no `=`, the path is not a TOML key, or the value looks like TOML and is broken.
     pub fn parse(text: &str) -> Result<Self, Diagnostics> {
-        let source = Source::new(format!("--set {text}"), text);
+        Self::parse_as(format!("--set {text}"), text)
+    }
+
+    /// The same for one that comes from somewhere else than `--set`: messages call it `name`.
+    ///
+    /// # Errors
+    /// As [`Self::parse`].
+    pub fn parse_as(name: impl Into<String>, text: &str) -> Result<Self, Diagnostics> {
+        let source = Source::new(name, text);
         let whole = Span::new(&source, 0..text.len());
         // A quoted part may contain `=`: the path ends at the first one before which a key is complete.
         let split = text.match_indices('=').find_map(|(at, _)| Some((at, key_path(&source, at)?)));
@@ -60,6 +68,11 @@ impl Override {
         let whole = Span::new(&self.source, 0..self.source.text.len());
         self.path.splice(0..0, parts.iter().map(|part| ((*part).to_owned(), whole.clone())));
         self
+    }
+
+    /// The parts of the path.
+    pub fn path(&self) -> impl Iterator<Item = &str> {
+        self.path.iter().map(|(part, _)| part.as_str())
     }
 
     /// What was typed, which places in messages point into.

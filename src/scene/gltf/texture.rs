@@ -14,7 +14,7 @@ use super::report::Report;
 use crate::diag::Diagnostic;
 use crate::files::FileStore;
 use crate::scene::ids::TextureId;
-use crate::scene::texture::{Image, Texture, TextureFilter, Wrap, decode};
+use crate::scene::texture::{self, Image, Texture, TextureFilter, Wrap, decode};
 
 /// Where an image comes from.
 #[derive(Clone, Debug, PartialEq)]
@@ -134,8 +134,8 @@ type Loaded = (String, Arc<Image>);
 fn load_image(wanted: &WantedImage, document: &Document, files: &FileStore) -> Result<Loaded, Option<Diagnostic>> {
     let from_file = |path: PathBuf| {
         let bytes = files.read(&path)?;
-        let image = decode(&path, &bytes, wanted.srgb)?;
-        Ok((path.display().to_string(), Arc::new(image)))
+        let image = texture::read_image(&path, &bytes, wanted.srgb, files)?;
+        Ok((path.display().to_string(), image))
     };
     let index = match &wanted.origin {
         Origin::File(path) => return from_file(path.clone()),
@@ -146,14 +146,15 @@ fn load_image(wanted: &WantedImage, document: &Document, files: &FileStore) -> R
     let json = &document.root.images[index];
     let name = json.name.clone().unwrap_or_else(|| format!("image {index}"));
     // An embedded image has no file of its own: its faults are the model's.
-    let embedded = |bytes: &[u8]| {
-        let image = decode(&document.folder, bytes, wanted.srgb).map_err(|inner| Diagnostic {
-            file: None,
-            message: fault(&inner.message).message,
-            ..inner
-        })?;
-        Ok((name, Arc::new(image)))
-    };
+    let embedded =
+        |bytes: &[u8]| {
+            let origin = format!("{} {name} {place} {}", wanted.wanted_by, wanted.srgb);
+            let decode = |bytes: &[u8]| decode(&document.folder, bytes, wanted.srgb);
+            let image = files
+                .make((&document.folder, &origin), &Arc::from(bytes), decode)
+                .map_err(|inner| Diagnostic { file: None, message: fault(&inner.message).message, ..inner })?;
+            Ok((name, image))
+        };
     match (&json.uri, json.buffer_view) {
         (Some(uri), _) => match resolve(&document.folder, uri).map_err(|message| fault(&message))? {
             Uri::File(path) => from_file(path),

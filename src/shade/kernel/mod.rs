@@ -130,8 +130,7 @@ impl Kernel {
     pub fn same_textures(&self, other: &Self) -> bool {
         let (own, others) = (&self.lowered.textures, &other.lowered.textures);
         let mut pairs = own.iter().zip(others);
-        own.len() == others.len()
-            && pairs.all(|(a, b)| a.place == b.place && (Arc::ptr_eq(&a.texture, &b.texture) || a.texture == b.texture))
+        own.len() == others.len() && pairs.all(|(a, b)| a.place == b.place && a.texture.looks_like(&b.texture))
     }
 
     /// Shades a batch into columns. `failed` gets the rows that the interpreter must look at; their columns hold

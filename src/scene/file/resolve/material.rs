@@ -164,8 +164,9 @@ impl Resolver<'_> {
         if let Some((.., image)) = self.images.iter().find(|(known, coded, _)| known == path && *coded == srgb) {
             return Some(Arc::clone(image));
         }
-        let read = self.context.files.read(path).and_then(|bytes| texture::decode(path, &bytes, srgb));
-        let image = Arc::new(read.map_err(|fault| self.faults.push(about_file(fault, span))).ok()?);
+        let files = self.context.files;
+        let read = files.read(path).and_then(|bytes| texture::read_image(path, &bytes, srgb, files));
+        let image = read.map_err(|fault| self.faults.push(about_file(fault, span))).ok()?;
         self.images.push((path.to_owned(), srgb, Arc::clone(&image)));
         Some(image)
     }
