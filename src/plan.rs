@@ -263,7 +263,7 @@ fn refracts(object: &Object, materials: &[MaterialPlan]) -> bool {
 }
 
 /// Least and greatest value an output can have, with its default where the script may leave it out; `None` if unknown.
-fn bounds(fact: &OutputFact, default: f32) -> Option<[f32; 2]> {
+pub(crate) fn bounds(fact: &OutputFact, default: f32) -> Option<[f32; 2]> {
     if !fact.may {
         return Some([default; 2]);
     }
@@ -374,7 +374,7 @@ fn read_on_pairs(scene: &Scene, shaders: &Shaders) -> PairSet {
 }
 
 /// Which materials are on objects that draw lines.
-fn drawing_materials(scene: &Scene) -> Vec<bool> {
+pub(crate) fn drawing_materials(scene: &Scene) -> Vec<bool> {
     let mut draws = vec![false; scene.materials().len()];
     for object in scene.objects().iter().filter(|object| object.lines) {
         for slot in &object.materials {
@@ -669,7 +669,7 @@ fn short_script_name(name: &str) -> &str {
     name.rsplit(['/', '\\']).next().unwrap_or(name)
 }
 
-fn filter_name(kind: FilterKind) -> &'static str {
+pub(crate) fn filter_name(kind: FilterKind) -> &'static str {
     match kind {
         FilterKind::Box => "box",
         FilterKind::Tent => "tent",

@@ -25,6 +25,7 @@ mod live;
 mod same_bits;
 mod session;
 mod stability;
+mod study;
 mod surfaces;
 mod truth;
 mod why;

@@ -2,12 +2,14 @@
 
 use std::path::PathBuf;
 use std::str::FromStr;
+use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use crate::line::Method;
 use crate::sample::PixelRect;
 use crate::shade::ShadingMode;
+use crate::study::Knob;
 
 /// Draws feature lines of ray-traced scenes, styled by Rhai scripts.
 #[derive(Debug, Parser)]
@@ -39,6 +41,8 @@ pub enum Command {
     Why(Box<WhyArguments>),
     /// Measures how much lines change from frame to frame beyond what motion explains.
     Flicker(Box<FlickerArguments>),
+    /// Measures what accuracy costs: renders a scene with many settings, and writes errors, times and a page with plots.
+    Study(Box<StudyArguments>),
     /// Checks, measures, starts and shows shaders.
     Shader {
         /// What to do.
@@ -123,6 +127,38 @@ pub struct FlickerArguments {
     /// Prints the numbers as JSON.
     #[arg(long)]
     pub json: bool,
+}
+
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Examples:\n  \
+        tusche study scene.toml -o study                    study/index.html shows the outcome\n  \
+        tusche study scene.toml -o study --size 320x180 --budget 5m\n  \
+        tusche study scene.toml -o study --knob samples --knob method --repeats 5\n\n\
+        Knobs: samples, method, ideal_samples, min_width, width_compensation, surfaces, reflection_depth,\n\
+        refraction_depth, filter. A study that was stopped goes on where it was.",
+    mut_arg("output", |argument| argument.help("The folder to write to; it is made if it is not there").value_name("DIR")),
+    mut_arg("layer", |argument| argument.hide(true)),
+    mut_arg("lines", |argument| argument.hide(true))
+)]
+pub struct StudyArguments {
+    #[command(flatten)]
+    pub scene: SceneArguments,
+    /// Takes no longer than this: 90s, 5m, 1h. What tells most is measured first.
+    #[arg(long, value_name = "TIME")]
+    pub budget: Option<Budget>,
+    /// How often every setting is measured, each time with another seed.
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=100))]
+    pub repeats: u32,
+    /// Samples per pixel of the reference.
+    #[arg(long, value_name = "N", default_value_t = 1024, value_parser = clap::value_parser!(u32).range(2..=65536))]
+    pub reference: u32,
+    /// Tries this knob; may be given more than once [default: all that matter to the scene].
+    #[arg(long, value_name = "NAME")]
+    pub knob: Vec<Knob>,
+    /// How many threads render [default: one for each core].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub threads: Option<u16>,
 }
 
 #[derive(Debug, Args)]
@@ -345,6 +381,23 @@ impl FromStr for Step {
             number.ok_or_else(|| format!("`{text}` is not a number of pixels"))
         };
         Ok(Self([number(x)?, number(y)?]))
+    }
+}
+
+/// `90s`, `5m`, `1h`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Budget(pub Duration);
+
+impl FromStr for Budget {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let units = [("s", 1.0), ("m", 60.0), ("h", 3600.0)];
+        let parts = units.iter().find_map(|(unit, seconds)| Some((text.strip_suffix(unit)?, seconds)));
+        let (number, unit) = parts.ok_or("write it with a unit, as in 90s, 5m or 1h")?;
+        let number = number.trim().parse::<f64>().ok().filter(|number| *number > 0.0);
+        let duration = number.and_then(|number| Duration::try_from_secs_f64(number * unit).ok());
+        duration.map(Self).ok_or_else(|| format!("`{text}` is not a time above 0"))
     }
 }
 

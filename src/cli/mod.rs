@@ -9,6 +9,7 @@ mod flicker;
 mod render;
 mod request;
 mod shader;
+mod study;
 mod terminal;
 mod watch;
 mod why;
@@ -60,6 +61,7 @@ pub fn run() -> u8 {
         Command::Watch(arguments) => watch::run(&arguments),
         Command::Why(arguments) => why::run(&arguments),
         Command::Flicker(arguments) => flicker::run(&arguments),
+        Command::Study(arguments) => study::run(&arguments),
         Command::Shader { command } => shader::run(&command),
         Command::Compare(arguments) => compare::run(&arguments),
         Command::Schema => print(&format!("{:#}\n", crate::scene::file::schema())),

@@ -58,6 +58,11 @@ impl Progress {
         }
     }
 
+    /// Says what is done now.
+    pub fn label(&self, label: &str) {
+        self.bar.set_message(label.to_owned());
+    }
+
     pub fn done(self) {
         self.bar.finish_and_clear();
     }

@@ -1,0 +1,285 @@
+//! How far a picture is from its reference: colours, coverage and place of lines, by region.
+
+use super::flip::{PIXELS_PER_DEGREE, flip};
+
+/// What a study looks at of a picture, row by row.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Shot {
+    /// Width in pixels.
+    pub width: usize,
+    /// Linear colours as a screen shows them: 0 … 1, what is transparent before white.
+    pub colors: Vec<[f32; 3]>,
+    /// How much of each pixel lines cover.
+    pub coverage: Vec<f32>,
+    /// How much lines cover that are seen in mirrors and through glass. Empty if there are none.
+    pub secondary: Vec<f32>,
+}
+
+impl Shot {
+    /// The mean of two pictures of one size.
+    #[must_use]
+    pub fn mean(a: &Self, b: &Self) -> Self {
+        let mean = |a: &[f32], b: &[f32]| a.iter().zip(b).map(|(a, b)| (a + b) / 2.0).collect();
+        let color = |(a, b): (&[f32; 3], &[f32; 3])| [0, 1, 2].map(|axis| (a[axis] + b[axis]) / 2.0);
+        Self {
+            width: a.width,
+            colors: a.colors.iter().zip(&b.colors).map(color).collect(),
+            coverage: mean(&a.coverage, &b.coverage),
+            secondary: mean(&a.secondary, &b.secondary),
+        }
+    }
+}
+
+/// Errors of a picture. Those of a region that has no pixels are `None`.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Errors {
+    /// Root mean square error of linear colours 0 … 1.
+    pub rmse: ByRegion,
+    /// Mean FLIP, 0 … 1.
+    pub flip: ByRegion,
+    /// Σ |coverage − reference| / Σ reference: which share of the lines' area is wrong.
+    pub coverage: Option<f64>,
+    /// Mean distance of lines from where they should be, in pixels; see [`Reference::errors`].
+    pub position: Option<f64>,
+}
+
+/// A number for the whole picture and for its parts.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ByRegion {
+    /// All pixels.
+    pub all: f64,
+    /// Within a pixel of lines that are seen directly.
+    pub lines: Option<f64>,
+    /// Within a pixel of lines that are seen in mirrors and through glass, but not of the former.
+    pub reflections: Option<f64>,
+    /// All other pixels.
+    pub rest: Option<f64>,
+}
+
+impl ByRegion {
+    /// Whole picture, lines, reflections, rest.
+    #[must_use]
+    pub fn parts(&self) -> [Option<f64>; 4] {
+        [Some(self.all), self.lines, self.reflections, self.rest]
+    }
+
+    fn of(regions: &[Region], value: impl Fn(usize) -> f64, finish: impl Fn(f64) -> f64) -> Self {
+        let mut sums = [(0.0, 0_usize); 3];
+        for (i, region) in regions.iter().enumerate() {
+            let (sum, count) = &mut sums[*region as usize];
+            *sum += value(i);
+            *count += 1;
+        }
+        let mean = |(sum, count): (f64, usize)| (count > 0).then(|| finish(sum / count as f64));
+        let all = sums.iter().fold((0.0, 0), |(sum, count), part| (sum + part.0, count + part.1));
+        let [lines, reflections, rest] = sums.map(mean);
+        Self { all: mean(all).unwrap_or_default(), lines, reflections, rest }
+    }
+
+    fn map(self, change: impl Fn(f64) -> f64 + Copy) -> Self {
+        let Self { all, lines, reflections, rest } = self;
+        Self {
+            all: change(all),
+            lines: lines.map(change),
+            reflections: reflections.map(change),
+            rest: rest.map(change),
+        }
+    }
+}
+
+impl Errors {
+    /// All errors multiplied.
+    #[must_use]
+    pub fn scaled(self, factor: f64) -> Self {
+        let scale = |x: f64| x * factor;
+        Self {
+            rmse: self.rmse.map(scale),
+            flip: self.flip.map(scale),
+            coverage: self.coverage.map(scale),
+            position: self.position.map(scale),
+        }
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Region {
+    Lines,
+    Reflections,
+    Rest,
+}
+
+/// Coverage below which a pixel is not taken for a line's.
+const INK: f32 = 0.01;
+/// Share of the reference's ink around a place below which a picture counts as having no line there.
+const MISSING: f64 = 0.1;
+
+/// A picture to compare with.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Reference {
+    shot: Shot,
+    regions: Vec<Region>,
+    /// Radius of the discs in which the place of a line is told, in pixels.
+    radius: i32,
+}
+
+impl Reference {
+    /// A reference whose lines are at most `widest` pixels wide.
+    #[must_use]
+    pub fn new(shot: Shot, widest: f32) -> Self {
+        let secondary = near(&shot, &shot.secondary);
+        // A line in a mirror is one of `coverage`, too.
+        let primary: Vec<f32> = if shot.secondary.is_empty() {
+            shot.coverage.clone()
+        } else {
+            shot.coverage.iter().zip(&shot.secondary).map(|(all, secondary)| all - secondary).collect()
+        };
+        let primary = near(&shot, &primary);
+        let region = |i: usize| match (primary[i], secondary[i]) {
+            (true, _) => Region::Lines,
+            (false, true) => Region::Reflections,
+            (false, false) => Region::Rest,
+        };
+        let regions = (0..shot.colors.len()).map(region).collect();
+        Self { shot, regions, radius: (widest / 2.0).clamp(0.0, 32.0).ceil() as i32 + 2 }
+    }
+
+    /// The picture itself.
+    #[must_use]
+    pub fn shot(&self) -> &Shot {
+        &self.shot
+    }
+
+    /// The errors of a picture of the same size.
+    ///
+    /// The place of a line is the centroid of ink in a disc around a pixel; its error is the distance of the picture's
+    /// centroid from the reference's in the same disc. Along the line both lie in the disc's middle, so what is left is
+    /// the distance across. It is averaged over all pixels, weighted by the reference's coverage. Where the picture has
+    /// less than a tenth of the ink, the line is missing, and its error is the disc's radius.
+    #[must_use]
+    pub fn errors(&self, test: &Shot) -> Errors {
+        let (reference, regions) = (&self.shot, &self.regions);
+        let square = |i: usize| {
+            let difference = |axis: usize| f64::from(reference.colors[i][axis]) - f64::from(test.colors[i][axis]);
+            (0..3).map(|axis| difference(axis) * difference(axis)).sum::<f64>() / 3.0
+        };
+        let flip = flip(reference.width, &reference.colors, &test.colors, PIXELS_PER_DEGREE);
+        let ink: f64 = reference.coverage.iter().map(|coverage| f64::from(*coverage)).sum();
+        let wrong = reference.coverage.iter().zip(&test.coverage).map(|(a, b)| (f64::from(*a) - f64::from(*b)).abs());
+        Errors {
+            rmse: ByRegion::of(regions, square, f64::sqrt),
+            flip: ByRegion::of(regions, |i| f64::from(flip[i]), |mean| mean),
+            coverage: (ink > 0.0).then(|| wrong.sum::<f64>() / ink),
+            position: self.position(&test.coverage),
+        }
+    }
+
+    fn position(&self, test: &[f32]) -> Option<f64> {
+        let (mut sum, mut weights) = (0.0, 0.0);
+        for (i, coverage) in self.shot.coverage.iter().enumerate().filter(|(_, coverage)| **coverage >= INK) {
+            let [expected, found] = [&self.shot.coverage, test].map(|ink| self.centroid(ink, i));
+            let missing = found[2] < MISSING * expected[2];
+            let across = |axis: usize| found[axis] / found[2] - expected[axis] / expected[2];
+            let distance = if missing { f64::from(self.radius) } else { across(0).hypot(across(1)) };
+            sum += f64::from(*coverage) * distance;
+            weights += f64::from(*coverage);
+        }
+        (weights > 0.0).then(|| sum / weights)
+    }
+
+    /// Moments of the ink around a pixel: x, y and 1.
+    fn centroid(&self, ink: &[f32], pixel: usize) -> [f64; 3] {
+        let width = self.shot.width as i32;
+        let (x0, y0, height) = (pixel as i32 % width, pixel as i32 / width, (ink.len() / self.shot.width) as i32);
+        let mut moments = [0.0; 3];
+        for y in (y0 - self.radius).max(0)..(y0 + self.radius + 1).min(height) {
+            let half = f64::from(self.radius * self.radius - (y - y0) * (y - y0)).sqrt() as i32;
+            for x in (x0 - half).max(0)..(x0 + half + 1).min(width) {
+                let ink = f64::from(ink[(y * width + x) as usize]);
+                [f64::from(x - x0), f64::from(y - y0), 1.0]
+                    .iter()
+                    .zip(&mut moments)
+                    .for_each(|(x, sum)| *sum += x * ink);
+            }
+        }
+        moments
+    }
+}
+
+/// Which pixels are within one of a line's.
+fn near(shot: &Shot, ink: &[f32]) -> Vec<bool> {
+    let (width, height) = (shot.width, shot.colors.len() / shot.width.max(1));
+    let mut near = vec![false; shot.colors.len()];
+    for (i, _) in ink.iter().enumerate().filter(|(_, ink)| **ink >= INK) {
+        let (x, y) = (i % width, i / width);
+        for y in y.saturating_sub(1)..(y + 2).min(height) {
+            near[y * width..][x.saturating_sub(1)..(x + 2).min(width)].fill(true);
+        }
+    }
+    near
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SIDE: usize = 40;
+
+    /// A vertical line of a width whose middle is at x.
+    fn line(x: f32, width: f32) -> Shot {
+        let covered = |i: usize| {
+            let left = (i % SIDE) as f32;
+            ((x + width / 2.0).min(left + 1.0) - (x - width / 2.0).max(left)).max(0.0)
+        };
+        let coverage: Vec<f32> = (0..SIDE * SIDE).map(covered).collect();
+        Shot {
+            width: SIDE,
+            colors: coverage.iter().map(|ink| [1.0 - ink; 3]).collect(),
+            coverage,
+            secondary: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn a_line_is_as_far_off_as_it_is_moved() {
+        let reference = Reference::new(line(20.0, 2.0), 2.0);
+        for moved in [0.0, 0.1, 0.4, 0.8] {
+            let position = reference.errors(&line(20.0 + moved, 2.0)).position.unwrap_or(f64::NAN);
+            // What leaves the discs of pixels at the line's rim makes it a little less.
+            assert!(
+                position > 0.8 * f64::from(moved) && position < 1.01 * f64::from(moved) + 1e-9,
+                "{moved}: {position}"
+            );
+        }
+        let missing = reference.errors(&line(500.0, 2.0));
+        assert_eq!((missing.position, missing.coverage), (Some(3.0), Some(1.0)));
+    }
+
+    #[test]
+    fn errors_are_those_of_arithmetic() {
+        let reference = Reference::new(line(20.0, 2.0), 2.0);
+        let found = reference.errors(&line(20.0, 3.0));
+        assert!(found.position.is_some_and(|position| position < 1e-6), "{found:?}");
+        assert!(found.coverage.is_some_and(|coverage| (coverage - 0.5).abs() < 1e-6), "{found:?}");
+        // Two of forty columns are off by a half.
+        assert!((found.rmse.all - (2.0_f64 / 40.0 * 0.25).sqrt()).abs() < 1e-6, "{found:?}");
+        assert!((found.rmse.lines.unwrap_or(0.0) - (2.0_f64 / 4.0 * 0.25).sqrt()).abs() < 1e-6, "{found:?}");
+        assert_eq!((found.rmse.reflections, found.rmse.rest), (None, Some(0.0)));
+        assert_eq!(reference.errors(&line(20.0, 2.0)).scaled(2.0).rmse.all, 0.0);
+    }
+
+    #[test]
+    fn lines_in_mirrors_are_a_region_of_their_own() {
+        let mut shot = line(20.0, 2.0);
+        shot.secondary = vec![0.0; SIDE * SIDE];
+        for row in 0..SIDE / 2 {
+            for x in 19..21 {
+                shot.secondary[row * SIDE + x] = 1.0;
+            }
+        }
+        let reference = Reference::new(shot.clone(), 2.0);
+        let count = |region| reference.regions.iter().filter(|known| **known == region).count();
+        assert_eq!((count(Region::Lines), count(Region::Reflections)), (4 * 21, 4 * 19));
+        let empty = Reference::new(line(500.0, 2.0), 2.0).errors(&shot);
+        assert_eq!((empty.position, empty.coverage, empty.rmse.lines), (None, None, None));
+    }
+}

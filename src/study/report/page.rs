@@ -1,0 +1,329 @@
+//! The page: plots, pictures and tables in one file that needs neither scripts nor a network.
+
+use std::fmt::Write as _;
+
+use super::crops;
+use super::summary::{Fit, MEASURES, Mean, Measure, Point, STAGES, Spread, Summary};
+use super::svg::{Dot, Plot, Power, Series, bars, escape, number, shape};
+use crate::study::folder::Folder;
+use crate::study::ladder::Knob;
+use crate::study::measure::Errors;
+use crate::study::run::Study;
+
+/// What stratified sampling promises for edges.
+const IDEAL: f64 = -0.75;
+
+pub(super) fn page(study: &Study, summary: &Summary, folder: &Folder) -> String {
+    let title = escape(&study.title);
+    let mut html = format!(
+        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
+         <title>{title}: what accuracy costs</title>\n<style>\n{}</style>\n</head>\n<body>\n",
+        include_str!("style.css")
+    );
+    let parts = [
+        head(study, summary),
+        plots(study, summary),
+        costs(study, summary),
+        pictures(study, summary, folder),
+        tables(study, summary),
+    ];
+    html.extend(parts);
+    html + "</body>\n</html>\n"
+}
+
+fn head(study: &Study, summary: &Summary) -> String {
+    let [width, height] = study.size;
+    let runs: usize = summary.points.iter().map(|point| point.runs).sum();
+    let threads = study.runs.iter().flatten().next().map_or(0, |run| run.threads);
+    let mut html = format!(
+        "<h1>{}: what accuracy costs</h1>\n<p class=\"soft\">{width} × {height} pixels, {} settings, {runs} pictures, \
+         {threads} threads, Tusche {}</p>\n",
+        escape(&study.title),
+        summary.points.len(),
+        env!("CARGO_PKG_VERSION"),
+    );
+    if study.left_out > 0 {
+        let _ = writeln!(html, "<p>{} pictures did not fit into the budget of time.</p>", study.left_out);
+    }
+    if !study.complete {
+        html.push_str("<p>The study was stopped before all was measured.</p>\n");
+    }
+    let own = |measure: &Measure| Some(format!("{} {}", measure.title, number((measure.of)(&study.own)?)));
+    let own: Vec<_> = MEASURES.iter().filter_map(own).collect();
+    let _ = writeln!(
+        html,
+        "<p>Every picture is compared with a reference of {} samples per pixel that has other sample patterns and no approximation \
+         but the filter. Its own errors, estimated from its two halves: {}.</p>",
+        study.reference,
+        escape(&own.join(", "))
+    );
+    let _ = writeln!(html, "<h2>What was tried</h2>\n<pre>{}</pre>", escape(&study.ladder.to_string()));
+    html
+}
+
+fn kind(knob: Knob) -> usize {
+    Knob::ALL.iter().position(|known| *known == knob).unwrap_or_default()
+}
+
+fn is_ladder_of_samples(knob: Knob) -> bool {
+    matches!(knob, Knob::Samples | Knob::IdealSamples)
+}
+
+fn plots(study: &Study, summary: &Summary) -> String {
+    let mut html = "<h2>Error against time</h2>\n<p>CPU seconds of tracing, shading, lines and film, summed over threads (median of the \
+                    repeats). Whiskers: least and greatest error. Dots: the front of what nothing beats in both. \
+                    Solid: the fitted power of the samples; dashed: the ideal N<sup>−0.75</sup> of stratified sampling at edges. \
+                    Where the samples' curve levels off, what is left is not noise but an approximation that the scene \
+                    makes; <i>ideal_samples</i> has none.</p>\n"
+        .to_owned();
+    html.push_str("<ul class=\"legend\">");
+    for rungs in &study.ladder.knobs {
+        let kind = kind(rungs.knob);
+        let _ = write!(
+            html,
+            "<li><svg viewBox=\"-8 -6 16 12\"><path class=\"dot k{kind}\" d=\"{}\"/></svg>{}</li>",
+            shape(kind),
+            rungs.knob.name()
+        );
+    }
+    html.push_str("</ul>\n<div class=\"two\">\n");
+    for measure in &MEASURES {
+        let fit = summary.fit(study, Knob::Samples, measure);
+        let plot = plot(study, summary, measure, fit);
+        if plot.series.iter().all(|series| series.dots.is_empty()) {
+            continue;
+        }
+        let mut caption = vec![format!("<b>{}</b>", measure.title)];
+        let mut tell = |name: &str, fit: Option<Fit>| match fit {
+            Some(fit) => caption.push(format!(
+                "{name}: N<sup>{:.2}</sup>, seconds<sup>{:.2}</sup> over {} points",
+                fit.by_samples, fit.by_seconds, fit.points
+            )),
+            None => caption.push(format!("{name}: too few points above the reference's own error for a slope")),
+        };
+        tell("samples", fit);
+        if study.ladder.knobs.iter().any(|rungs| rungs.knob == Knob::IdealSamples) {
+            tell("ideal samples", summary.fit(study, Knob::IdealSamples, measure));
+        }
+        let _ = writeln!(html, "<figure>{}<figcaption>{}</figcaption></figure>", plot.svg(), caption.join(" · "));
+    }
+    html + "</div>\n"
+}
+
+fn plot<'a>(study: &Study, summary: &Summary, measure: &'a Measure, fit: Option<Fit>) -> Plot<'a> {
+    let dot = |point: &Point, knob: Knob| {
+        let values: Vec<f64> = point.errors.iter().filter_map(measure.of).collect();
+        let mean = Mean::of(&values)?.mean;
+        let spread = Spread::of(values);
+        let value = point.settings.value(knob);
+        Some(Dot {
+            at: [point.cpu.median, mean],
+            reach: [spread.least, spread.greatest],
+            name: format!("{}: {} s, {}", point.name, number(point.cpu.median), number(mean)),
+            label: (knob == Knob::Samples || (knob == Knob::Method && point.index > 0)).then_some(value),
+        })
+        .filter(|dot| dot.at.iter().all(|value| *value > 0.0))
+    };
+    let series: Vec<Series> = study
+        .ladder
+        .knobs
+        .iter()
+        .map(|rungs| Series {
+            kind: kind(rungs.knob),
+            // The scene itself is on every ladder; it is drawn once.
+            dots: summary
+                .of_knob(study, rungs.knob)
+                .into_iter()
+                .filter(|point| point.index > 0 || rungs.knob == Knob::Samples)
+                .filter_map(|point| dot(point, rungs.knob))
+                .collect(),
+            joined: is_ladder_of_samples(rungs.knob),
+        })
+        .rev()
+        .collect();
+    let seconds: Vec<f64> = summary.of_knob(study, Knob::Samples).iter().map(|point| point.cpu.median).collect();
+    let ends = Spread::of(seconds);
+    let mut powers = Vec::new();
+    if let Some(fit) = fit.filter(|_| ends.least > 0.0) {
+        let from = [ends.least, ends.greatest];
+        let (slope, at_one) = (fit.by_seconds, fit.at_one_second);
+        powers.push(Power { class: "fit", slope, at_one, from, name: format!("fitted: seconds^{slope:.2}") });
+        // The ideal begins where the fit does.
+        let ideal = at_one * libm::pow(ends.least, slope - IDEAL);
+        powers.push(Power {
+            class: "ideal",
+            slope: IDEAL,
+            at_one: ideal,
+            from,
+            name: format!("ideal: seconds^{IDEAL}"),
+        });
+    }
+    let corner = |point: &&Point| Some([point.cpu.median, point.error(measure.of)?.mean]);
+    Plot {
+        title: measure.title,
+        x: "CPU seconds",
+        y: format!("{} ({})", measure.title, measure.unit),
+        series,
+        powers,
+        front: summary.front(measure).iter().filter_map(corner).filter(|[_, error]| *error > 0.0).collect(),
+        floor: (measure.of)(&study.own).filter(|floor| *floor > 0.0),
+    }
+}
+
+fn costs(study: &Study, summary: &Summary) -> String {
+    let mut html = "<h2>Cost by stage</h2>\n<ul class=\"legend\">".to_owned();
+    for (i, stage) in STAGES.iter().enumerate() {
+        let _ = write!(
+            html,
+            "<li><svg viewBox=\"0 0 16 12\"><rect class=\"s{i}\" width=\"12\" height=\"12\"/></svg>{stage}</li>"
+        );
+    }
+    html.push_str("</ul>\n<div class=\"two\">\n");
+    let samples: Vec<&Point> = summary.of_knob(study, Knob::Samples);
+    let others: Vec<&Point> = summary
+        .points
+        .iter()
+        .filter(|point| point.index == 0 || point.settings.samples == study.ladder.points[0].samples)
+        .collect();
+    let stages =
+        |points: &[&Point]| points.iter().map(|point| (point.name.clone(), point.stages.to_vec())).collect::<Vec<_>>();
+    let bytes = |points: &[&Point]| {
+        points.iter().map(|point| (point.name.clone(), vec![0.0, point.bytes_per_sample])).collect::<Vec<_>>()
+    };
+    for (points, caption) in [(&samples, "by samples"), (&others, "by everything else, at the scene's samples")] {
+        let plot = bars("cost by stage", &stages(points), "s");
+        let _ = writeln!(html, "<figure>{plot}<figcaption>CPU seconds, {caption}</figcaption></figure>");
+    }
+    html.push_str("</div>\n<h2>Memory</h2>\n<div class=\"two\">\n");
+    for (points, caption) in [(&samples, "by samples"), (&others, "by everything else")] {
+        let plot = bars("memory", &bytes(points), "B");
+        let _ = writeln!(
+            html,
+            "<figure>{plot}<figcaption>Bytes that a sample takes while its tile is in memory, with what the line search prepares, \
+             {caption}</figcaption></figure>"
+        );
+    }
+    html + "</div>\n"
+}
+
+fn pictures(study: &Study, summary: &Summary, folder: &Folder) -> String {
+    let Some(reference) = crops::read(&folder.picture("reference")) else { return String::new() };
+    let worst = summary.points.iter().min_by_key(|point| point.settings.samples);
+    let worst = worst.and_then(|point| crops::read(&folder.picture(&point.name)));
+    let place = crops::most_telling(&reference, worst.as_ref().unwrap_or(&reference));
+    let [x, y, width, height] = place;
+    let mut html = format!(
+        "<h2>Side by side</h2>\n<p>The part of {width} × {height} pixels from ({x}, {y}), where the fewest samples are most wrong; beside it the \
+         difference from the reference, {} times as bright. The pictures themselves are in the folder <i>pictures</i>.</p>\n",
+        crops::GAIN
+    );
+    let image = |picture: &image::RgbImage, class: &str, what: &str| {
+        let uri = crops::data_uri(picture).unwrap_or_default();
+        format!(
+            "<img{class} width=\"{}\" height=\"{}\" alt=\"{}\" src=\"{uri}\">",
+            picture.width(),
+            picture.height(),
+            escape(what)
+        )
+    };
+    html.push_str("<div class=\"crops\">\n");
+    let cropped = crops::crop(&reference, place);
+    let whole = {
+        let [width, height] = [reference.width(), reference.height()];
+        let scale = (480.0 / f64::from(width.max(1))).min(1.0);
+        let [w, h] = [width, height].map(|side| ((f64::from(side) * scale) as u32).max(1));
+        image::imageops::resize(&reference, w, h, image::imageops::FilterType::Triangle)
+    };
+    let _ = writeln!(
+        html,
+        "<figure>{}<figcaption>The reference</figcaption></figure>\n\
+         <figure><div class=\"pair\">{}</div><figcaption>The reference, the part</figcaption></figure>",
+        image(&whole, " class=\"whole\"", "the reference"),
+        image(&cropped, "", "part of the reference"),
+    );
+    html.push_str("</div>\n");
+    for rungs in &study.ladder.knobs {
+        let _ = write!(html, "<h3>{}</h3>\n<div class=\"crops\">\n", rungs.knob.name());
+        for point in summary.of_knob(study, rungs.knob) {
+            let Some(picture) = crops::read(&folder.picture(&point.name)) else { continue };
+            if picture.dimensions() != reference.dimensions() {
+                continue;
+            }
+            let part = crops::crop(&picture, place);
+            let difference = crops::difference(&part, &cropped);
+            let value = point.settings.value(rungs.knob);
+            let errors = [("coverage", &MEASURES[0]), ("FLIP", &MEASURES[2])]
+                .into_iter()
+                .filter_map(|(name, measure)| Some(format!("{name} {}", number(point.error(measure.of)?.mean))));
+            let _ = writeln!(
+                html,
+                "<figure><div class=\"pair\">{}{}</div><figcaption><b>{}</b>{} · {} s · {}</figcaption></figure>",
+                image(&part, "", &point.name),
+                image(&difference, "", "difference from the reference"),
+                escape(&value),
+                if point.index == 0 { " (the scene)" } else { "" },
+                number(point.cpu.median),
+                errors.collect::<Vec<_>>().join(" · ")
+            );
+        }
+        html.push_str("</div>\n");
+    }
+    html
+}
+
+fn tables(study: &Study, summary: &Summary) -> String {
+    let mut html = "<h2>All numbers</h2>\n<p>Seconds are medians, with least and greatest; errors are means, with the standard deviation \
+                    over seeds. Coverage: which share of the lines' area is wrong. Position: how far lines are from their places, in \
+                    pixels.</p>\n<div class=\"wide\"><table>\n<thead><tr><th>setting</th><th>runs</th><th>wall, s</th><th>CPU, s</th>\
+                    <th>bytes/sample</th><th>coverage</th><th>position, px</th><th>FLIP</th><th>RMSE</th></tr></thead>\n<tbody>\n"
+        .to_owned();
+    rows(&mut html, study, summary, |point| {
+        let spread = |spread: Spread| {
+            let Spread { median, least, greatest } = spread;
+            format!("{} <span class=\"soft\">({}–{})</span>", number(median), number(least), number(greatest))
+        };
+        let mut cells =
+            vec![point.runs.to_string(), spread(point.wall), spread(point.cpu), number(point.bytes_per_sample)];
+        cells.extend(MEASURES.iter().map(|measure| cell(point.error(measure.of))));
+        cells
+    });
+    html.push_str(
+        "</tbody></table></div>\n<h3>By region</h3>\n<p>Lines: within a pixel of lines that are seen directly. Reflections: within a pixel of \
+         lines in mirrors and glass. Rest: all other pixels.</p>\n<div class=\"wide\"><table>\n<thead><tr><th>setting</th><th>FLIP, lines</th>\
+         <th>reflections</th><th>rest</th><th>RMSE, lines</th><th>reflections</th><th>rest</th></tr></thead>\n<tbody>\n",
+    );
+    rows(&mut html, study, summary, |point| {
+        let part = |of: fn(&Errors) -> Option<f64>| cell(point.error(of));
+        vec![
+            part(|errors| errors.flip.lines),
+            part(|errors| errors.flip.reflections),
+            part(|errors| errors.flip.rest),
+            part(|errors| errors.rmse.lines),
+            part(|errors| errors.rmse.reflections),
+            part(|errors| errors.rmse.rest),
+        ]
+    });
+    html + "</tbody></table></div>\n"
+}
+
+fn cell(mean: Option<Mean>) -> String {
+    match mean {
+        None => "–".to_owned(),
+        Some(Mean { mean, deviation: 0.0 }) => number(mean),
+        Some(Mean { mean, deviation }) => {
+            format!("{} <span class=\"soft\">± {}</span>", number(mean), number(deviation))
+        }
+    }
+}
+
+fn rows(html: &mut String, study: &Study, summary: &Summary, cells: impl Fn(&Point) -> Vec<String>) {
+    for rungs in &study.ladder.knobs {
+        let _ = writeln!(html, "<tr class=\"group\"><td colspan=\"9\">{}</td></tr>", rungs.knob.name());
+        for point in summary.of_knob(study, rungs.knob) {
+            let class = if point.index == 0 { " class=\"own\"" } else { "" };
+            let cells: String = cells(point).iter().map(|cell| format!("<td>{cell}</td>")).collect();
+            let _ = writeln!(html, "<tr{class}><td>{}</td>{cells}</tr>", escape(&point.settings.value(rungs.knob)));
+        }
+    }
+}

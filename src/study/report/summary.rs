@@ -1,0 +1,237 @@
+//! What the runs of a study come to: medians, means, slopes and the front of what is worth its time.
+
+use serde::Serialize;
+
+use crate::study::ladder::{Knob, Settings};
+use crate::study::measure::Errors;
+use crate::study::run::Study;
+use crate::study::table::Run;
+
+/// An error that plots show.
+#[derive(Clone, Copy, Debug)]
+pub struct Measure {
+    /// As in tables.
+    pub name: &'static str,
+    /// As people call it.
+    pub title: &'static str,
+    /// What the numbers mean.
+    pub unit: &'static str,
+    /// Its value among all errors.
+    pub of: fn(&Errors) -> Option<f64>,
+}
+
+/// The errors of the whole picture, the most telling about lines first.
+pub const MEASURES: [Measure; 4] = [
+    Measure {
+        name: "line_coverage",
+        title: "Line coverage error",
+        unit: "share of the lines' area",
+        of: |errors| errors.coverage,
+    },
+    Measure { name: "line_position", title: "Line position error", unit: "pixels", of: |errors| errors.position },
+    Measure { name: "flip", title: "FLIP", unit: "mean, 0 to 1", of: |errors| Some(errors.flip.all) },
+    Measure { name: "rmse", title: "RMSE", unit: "linear colours, 0 to 1", of: |errors| Some(errors.rmse.all) },
+];
+
+/// The middle of several numbers, and how far they reach.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Spread {
+    /// The median.
+    pub median: f64,
+    /// The least.
+    pub least: f64,
+    /// The greatest.
+    pub greatest: f64,
+}
+
+impl Spread {
+    /// Of some numbers; all 0 of none.
+    #[must_use]
+    pub fn of(mut values: Vec<f64>) -> Self {
+        values.sort_by(f64::total_cmp);
+        let Some((least, greatest)) = values.first().copied().zip(values.last().copied()) else {
+            return Self::default();
+        };
+        let middle = values.len() / 2;
+        let median =
+            if values.len().is_multiple_of(2) { (values[middle - 1] + values[middle]) / 2.0 } else { values[middle] };
+        Self { median, least, greatest }
+    }
+}
+
+/// The mean of several numbers and their standard deviation.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Mean {
+    /// The mean.
+    pub mean: f64,
+    /// The standard deviation; 0 of a single number.
+    pub deviation: f64,
+}
+
+impl Mean {
+    /// Of some numbers; `None` of none.
+    #[must_use]
+    pub fn of(values: &[f64]) -> Option<Self> {
+        let count = values.len() as f64;
+        let mean = values.iter().sum::<f64>() / count;
+        let squares: f64 = values.iter().map(|value| (value - mean) * (value - mean)).sum();
+        (!values.is_empty()).then(|| Self { mean, deviation: (squares / (count - 1.0).max(1.0)).sqrt() })
+    }
+}
+
+/// A point that was measured at least once.
+#[derive(Clone, Debug)]
+pub struct Point {
+    /// Its place in the ladder.
+    pub index: usize,
+    /// Its name.
+    pub name: String,
+    /// Its settings.
+    pub settings: Settings,
+    /// How often it was measured.
+    pub runs: usize,
+    /// Wall seconds.
+    pub wall: Spread,
+    /// CPU seconds of tracing, shading, lines and film.
+    pub cpu: Spread,
+    /// Median CPU seconds of build, trace, shade, lines, film.
+    pub stages: [f64; 5],
+    /// Bytes per sample.
+    pub bytes_per_sample: f64,
+    /// The errors of every run.
+    pub errors: Vec<Errors>,
+}
+
+/// What [`Point::stages`] are.
+pub const STAGES: [&str; 5] = ["build", "trace", "shade", "lines", "film"];
+
+impl Point {
+    fn new(index: usize, study: &Study) -> Option<Self> {
+        let runs = &study.runs[index];
+        let all = |value: fn(&Run) -> f64| Spread::of(runs.iter().map(value).collect());
+        let stages: [fn(&Run) -> f64; 5] = [
+            |run| run.build_seconds,
+            |run| run.trace_seconds,
+            |run| run.shade_seconds,
+            |run| run.lines_seconds,
+            |run| run.film_seconds,
+        ];
+        (!runs.is_empty()).then(|| Self {
+            index,
+            name: study.ladder.name(index),
+            settings: study.ladder.points[index],
+            runs: runs.len(),
+            wall: all(|run| run.wall_seconds),
+            cpu: all(Run::cpu_seconds),
+            stages: stages.map(|stage| all(stage).median),
+            bytes_per_sample: all(|run| run.bytes_per_sample).median,
+            errors: runs.iter().map(Run::errors).collect(),
+        })
+    }
+
+    /// An error over all runs.
+    #[must_use]
+    pub fn error(&self, of: impl Fn(&Errors) -> Option<f64>) -> Option<Mean> {
+        Mean::of(&self.errors.iter().filter_map(of).collect::<Vec<_>>())
+    }
+}
+
+/// How an error falls with samples: error = `at_one` · N^`slope`, and likewise with CPU seconds.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Fit {
+    /// The exponent by samples.
+    pub by_samples: f64,
+    /// The exponent by CPU seconds.
+    pub by_seconds: f64,
+    /// The error at one second, of the line through the points.
+    pub at_one_second: f64,
+    /// How many points it goes through.
+    pub points: usize,
+}
+
+/// What a study comes to.
+#[derive(Clone, Debug)]
+pub struct Summary {
+    /// Points that were measured.
+    pub points: Vec<Point>,
+}
+
+impl Summary {
+    /// Of a study.
+    #[must_use]
+    pub fn new(study: &Study) -> Self {
+        Self { points: (0..study.ladder.points.len()).filter_map(|index| Point::new(index, study)).collect() }
+    }
+
+    /// A point by its place in the ladder.
+    #[must_use]
+    pub fn point(&self, index: usize) -> Option<&Point> {
+        self.points.iter().find(|point| point.index == index)
+    }
+
+    /// The points of a knob, in order.
+    #[must_use]
+    pub fn of_knob(&self, study: &Study, knob: Knob) -> Vec<&Point> {
+        let rungs = study.ladder.knobs.iter().filter(|rungs| rungs.knob == knob).flat_map(|rungs| &rungs.points);
+        rungs.filter_map(|index| self.point(*index)).collect()
+    }
+
+    /// How an error falls along a ladder of samples. Points whose error is not well above the reference's own tell nothing of
+    /// it, and there must be three others.
+    #[must_use]
+    pub fn fit(&self, study: &Study, knob: Knob, measure: &Measure) -> Option<Fit> {
+        let floor = (measure.of)(&study.own).unwrap_or(0.0);
+        let points = self.of_knob(study, knob);
+        let usable: Vec<[f64; 3]> = points
+            .iter()
+            .filter_map(|point| {
+                let error = point.error(measure.of)?.mean;
+                let seconds = point.cpu.median;
+                let tells = error > 3.0 * floor && error > 0.0 && seconds > 0.0;
+                tells.then(|| [libm::log(f64::from(point.settings.samples)), libm::log(seconds), libm::log(error)])
+            })
+            .collect();
+        if usable.len() < 3 {
+            return None;
+        }
+        let line = |axis: usize| {
+            let count = usable.len() as f64;
+            let [x, y] = [axis, 2].map(|axis| usable.iter().map(|point| point[axis]).sum::<f64>() / count);
+            let product: f64 = usable.iter().map(|point| (point[axis] - x) * (point[2] - y)).sum();
+            let slope = product / usable.iter().map(|point| (point[axis] - x) * (point[axis] - x)).sum::<f64>();
+            (slope, y - slope * x)
+        };
+        let ((by_samples, _), (by_seconds, at)) = (line(0), line(1));
+        Some(Fit { by_samples, by_seconds, at_one_second: libm::exp(at), points: usable.len() })
+            .filter(|fit| fit.by_samples.is_finite() && fit.by_seconds.is_finite())
+    }
+
+    /// The points that no other beats in both time and error, by rising time.
+    #[must_use]
+    pub fn front(&self, measure: &Measure) -> Vec<&Point> {
+        let error = |point: &Point| point.error(measure.of).map_or(f64::INFINITY, |error| error.mean);
+        let mut points: Vec<&Point> = self.points.iter().filter(|point| error(point).is_finite()).collect();
+        points.sort_by(|a, b| a.cpu.median.total_cmp(&b.cpu.median).then(error(a).total_cmp(&error(b))));
+        let mut least = f64::INFINITY;
+        points.retain(|point| {
+            let better = error(point) < least;
+            least = least.min(error(point));
+            better
+        });
+        points
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn medians_means_and_spreads_are_those_of_arithmetic() {
+        let spread = Spread::of(vec![3.0, 1.0, 2.0, 10.0]);
+        assert_eq!(spread, Spread { median: 2.5, least: 1.0, greatest: 10.0 });
+        assert_eq!(Spread::of(vec![]), Spread::default());
+        assert_eq!(Mean::of(&[1.0, 3.0]), Some(Mean { mean: 2.0, deviation: 2.0_f64.sqrt() }));
+        assert_eq!((Mean::of(&[]), Mean::of(&[5.0])), (None, Some(Mean { mean: 5.0, deviation: 0.0 })));
+    }
+}

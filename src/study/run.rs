@@ -1,0 +1,336 @@
+//! The course of a study: the reference, then every point of the ladder, the most telling first.
+
+use std::fmt::Write as _;
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use super::flip::shown;
+use super::folder::Folder;
+use super::ladder::{Knob, Ladder, Settings};
+use super::measure::{Errors, Reference, Shot};
+use super::table::{self, Run};
+use crate::diag::{Diagnostic, Diagnostics};
+use crate::film::{FilmTile, Layer, LinePath};
+use crate::plan::Plan;
+use crate::render::stats::Stats;
+use crate::render::{Control, RenderOptions, render};
+use crate::scene::{Scene, SceneBuilder};
+use crate::shade::Shaders;
+
+/// How to study.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StudyOptions {
+    /// What the report calls the scene.
+    pub title: String,
+    /// The knobs to try; those that do not matter to the scene are left out.
+    pub knobs: Vec<Knob>,
+    /// How often each point is measured, each time with another seed; at least 1.
+    pub repeats: u32,
+    /// Samples per pixel of the reference, at least 2.
+    pub reference: u32,
+    /// The most time to take; points that do not fit are left out, the least telling first.
+    pub budget: Option<Duration>,
+    /// Threads; 0 for as many as the machine has.
+    pub threads: usize,
+}
+
+impl Default for StudyOptions {
+    fn default() -> Self {
+        let knobs = Knob::ALL.to_vec();
+        Self { title: "scene".to_owned(), knobs, repeats: 3, reference: 1024, budget: None, threads: 0 }
+    }
+}
+
+/// What was measured.
+#[derive(Clone, Debug)]
+pub struct Study {
+    /// What the report calls the scene.
+    pub title: String,
+    /// Width and height in pixels.
+    pub size: [u32; 2],
+    /// What was tried.
+    pub ladder: Ladder,
+    /// Samples per pixel of the reference.
+    pub reference: u32,
+    /// The reference's own errors, estimated from its two halves.
+    pub own: Errors,
+    /// Every picture of this ladder that was measured, by point.
+    pub runs: Vec<Vec<Run>>,
+    /// Pictures that were to be measured and were not, for want of time.
+    pub left_out: usize,
+    /// False if it was stopped.
+    pub complete: bool,
+}
+
+/// Called with the share that is done, 0 … 1, and with what is done next.
+pub type Progress<'a> = &'a (dyn Fn(f64, &str) + Sync);
+
+/// How a caller follows and stops a study.
+#[derive(Default)]
+pub struct StudyControl<'a> {
+    /// Once true, the study soon ends with what is there.
+    pub cancel: Option<&'a AtomicBool>,
+    /// Follows it.
+    pub progress: Option<Progress<'a>>,
+}
+
+/// Studies a scene into a folder: `study.csv`, the reference and the pictures. What the folder already holds of the same
+/// scene is not measured again.
+///
+/// # Errors
+/// If the scene draws no lines, a script fails, the budget does not reach for the reference and one picture, the folder cannot
+/// be written to, or the study is stopped before the reference is there.
+pub fn study(
+    scene: Scene,
+    shaders: &Shaders,
+    folder: &Path,
+    options: &StudyOptions,
+    control: &StudyControl<'_>,
+) -> Result<Study, Diagnostics> {
+    let start = Instant::now();
+    let ladder = Ladder::new(&scene, shaders, &options.knobs);
+    let plan = Plan::new(&scene, shaders, &[Layer::Rgba]);
+    let Some(lines) = &plan.lines else {
+        let fault = Diagnostic::error("this scene draws no lines, so there is no accuracy of lines to study");
+        return Err(fault.hint("`tusche explain` says why").into());
+    };
+    let folder = Folder::open(folder)?;
+    let known = table::read(&folder.table())?;
+    let camera = Camera {
+        key: key(&scene),
+        seed: scene.render().seed,
+        size: scene.render().size,
+        secondary: plan.has_secondary_rays(),
+        builder: scene.into_builder(),
+        shaders,
+        threads: options.threads,
+        cancel: control.cancel,
+    };
+    let say = |share: f64, what: &str| control.progress.iter().for_each(|progress| progress(share, what));
+    let deadline = options.budget.map(|budget| start + budget);
+
+    // The scene's own picture tells what all others will take.
+    let mut first = None;
+    let known_seconds = known.iter().find(|run| run.scene == camera.key && run.is_of(&ladder.points[0]));
+    let per_sample = match known_seconds {
+        Some(run) => run.wall_seconds,
+        None => {
+            say(0.0, "the scene");
+            let Some((shot, stats)) = camera.shoot(&ladder.points[0], 0)? else { return Err(stopped()) };
+            first.insert((shot, stats)).1.seconds.total
+        }
+    } / f64::from(ladder.points[0].samples);
+    let (reference, samples, own) = match folder.reference(&camera.key) {
+        Some((shot, samples, own)) if options.budget.is_some() || samples == options.reference.max(2) => {
+            (Reference::new(shot, lines.widest), samples, own)
+        }
+        _ => {
+            let samples = reference_samples(options, ladder.points[0].samples, per_sample)?;
+            say(0.01, "the reference");
+            let Some((shot, own)) = camera.reference(&ladder.ideal, samples, lines.widest)? else {
+                return Err(stopped());
+            };
+            folder.keep_reference(&camera.key, samples, &shot, &own)?;
+            (Reference::new(shot, lines.widest), samples, own)
+        }
+    };
+    folder.keep_picture("reference", reference.shot())?;
+
+    let identity = (camera.key.as_str(), samples);
+    let mut runs: Vec<Run> =
+        known.into_iter().filter(|run| run.scene == identity.0 && run.reference == samples).collect();
+    let mut waiting = Vec::new();
+    for repeat in 0..options.repeats.max(1) {
+        for point in ladder.order() {
+            let settings = &ladder.points[point];
+            if !runs.iter().any(|run| run.repeat == repeat && run.is_of(settings)) {
+                waiting.push((point, repeat));
+            }
+        }
+    }
+    let mut done = f64::from(samples);
+    let all = done + waiting.iter().map(|(point, _)| f64::from(ladder.points[*point].samples)).sum::<f64>();
+    let (mut left_out, mut complete) = (0, true);
+    for (point, repeat) in waiting {
+        let settings = &ladder.points[point];
+        let expected = expected_seconds(&runs, settings.samples);
+        let taken = if (point, repeat) == (0, 0) { first.take() } else { None };
+        if taken.is_none()
+            && deadline.is_some_and(|deadline| deadline.saturating_duration_since(Instant::now()) < seconds(expected))
+        {
+            left_out += 1;
+            continue;
+        }
+        say(done / all, &ladder.name(point));
+        let shot = if taken.is_some() { taken } else { camera.shoot(settings, repeat)? };
+        let Some((shot, stats)) = shot else {
+            complete = false;
+            break;
+        };
+        runs.push(Run::new(identity, settings, repeat, &stats, &reference.errors(&shot)));
+        if repeat == 0 {
+            folder.keep_picture(&ladder.name(point), &shot)?;
+        }
+        table::write(&folder.table(), &runs)?;
+        done += f64::from(settings.samples);
+    }
+    let of_point = |settings: &Settings| runs.iter().filter(|run| run.is_of(settings)).cloned().collect();
+    let runs = ladder.points.iter().map(of_point).collect();
+    Ok(Study {
+        title: options.title.clone(),
+        size: camera.size,
+        ladder,
+        reference: samples,
+        own,
+        runs,
+        left_out,
+        complete,
+    })
+}
+
+fn stopped() -> Diagnostics {
+    let fault = Diagnostic::error("stopped before anything could be measured");
+    fault.hint("run the same command again").into()
+}
+
+fn seconds(seconds: f64) -> Duration {
+    Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX)
+}
+
+/// How long a picture will surely not take longer than: one of fewer samples takes no longer, and one of more takes at most
+/// as much longer as it has more samples, since some of the time is the same for all.
+fn expected_seconds(runs: &[Run], samples: u32) -> f64 {
+    let longest = |run: &Run| run.wall_seconds * (f64::from(samples) / f64::from(run.samples)).max(1.0);
+    runs.iter().map(longest).fold(f64::INFINITY, f64::min)
+}
+
+/// How many samples the reference gets: what is asked for, or what fits into 40 % of the budget, but at least four times those
+/// of the scene.
+///
+/// # Errors
+/// If the budget does not reach for that.
+pub fn reference_samples(options: &StudyOptions, own: u32, per_sample: f64) -> Result<u32, Diagnostic> {
+    let asked = options.reference.max(2);
+    let Some(budget) = options.budget else { return Ok(asked) };
+    let least = own.saturating_mul(4).min(asked);
+    let affordable = 0.4 * budget.as_secs_f64() / per_sample.max(1e-12);
+    if affordable >= f64::from(least) {
+        return Ok(asked.min(affordable as u32));
+    }
+    let needed = (f64::from(least) * per_sample / 0.4).max(0.1);
+    let fault = Diagnostic::error(format!(
+        "a budget of {:.1} s is too small: the reference needs {:.1} s even with only {least} samples",
+        budget.as_secs_f64(),
+        f64::from(least) * per_sample
+    ));
+    Err(fault.hint(format!("give --budget {:.0}s or more, or make the picture smaller with --size", needed.ceil())))
+}
+
+/// A number that tells scenes apart: a hash of all that they are made of, and of Tusche's version.
+#[must_use]
+pub fn key(scene: &Scene) -> String {
+    struct Fnv(u64);
+    impl std::fmt::Write for Fnv {
+        fn write_str(&mut self, text: &str) -> std::fmt::Result {
+            for byte in text.bytes() {
+                self.0 = (self.0 ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
+            }
+            Ok(())
+        }
+    }
+    let mut hash = Fnv(0xcbf2_9ce4_8422_2325);
+    // Nothing here can fail.
+    let _ = write!(hash, "{} {scene:?}", env!("CARGO_PKG_VERSION"));
+    // Never a number to those who read tables.
+    format!("h{:016x}", hash.0)
+}
+
+/// Takes pictures of one scene with changing settings.
+struct Camera<'a> {
+    key: String,
+    seed: u64,
+    size: [u32; 2],
+    secondary: bool,
+    builder: SceneBuilder,
+    shaders: &'a Shaders,
+    threads: usize,
+    cancel: Option<&'a AtomicBool>,
+}
+
+impl Camera<'_> {
+    /// A picture with the seed of a repeat: the scene's own for the first. `None` if it was stopped.
+    fn shoot(&self, settings: &Settings, repeat: u32) -> Result<Option<(Shot, Stats)>, Diagnostics> {
+        let seed = if repeat == 0 { self.seed } else { self.unused_seed(u64::from(repeat) + 16) };
+        self.take(settings, seed, &[Layer::Rgba, Layer::Line])
+    }
+
+    /// The mean of two halves, and its own errors: half of what they differ by.
+    fn reference(&self, ideal: &Settings, samples: u32, widest: f32) -> Result<Option<(Shot, Errors)>, Diagnostics> {
+        let settings = Settings { samples: samples.div_ceil(2), ..*ideal };
+        let mut layers = vec![Layer::Rgba, Layer::Line];
+        if self.secondary {
+            layers.extend([LinePath::Reflection, LinePath::Refraction].map(Layer::LinePath));
+        }
+        let half = |purpose| self.take(&settings, self.unused_seed(purpose), &layers);
+        let (Some((a, _)), Some((b, _))) = (half(1)?, half(2)?) else { return Ok(None) };
+        let own = Reference::new(a.clone(), widest).errors(&b).scaled(0.5);
+        Ok(Some((Shot::mean(&a, &b), own)))
+    }
+
+    /// Seeds that nobody chooses, so that no pattern is used for two purposes.
+    fn unused_seed(&self, purpose: u64) -> u64 {
+        self.seed ^ (purpose << 40)
+    }
+
+    fn take(&self, settings: &Settings, seed: u64, layers: &[Layer]) -> Result<Option<(Shot, Stats)>, Diagnostics> {
+        let mut builder = self.builder.clone();
+        settings.apply(&mut builder);
+        builder.render.seed = seed;
+        let scene = builder.build()?;
+        let plan = Plan::new(&scene, self.shaders, layers);
+        let [width, height] = self.size.map(|side| side as usize);
+        let channels: usize = layers.iter().map(|layer| layer.channels().len()).sum();
+        let planes = Mutex::new(vec![vec![0.0_f32; width * height]; channels]);
+        let emit = |tile: &FilmTile| {
+            let mut planes = planes.lock().unwrap_or_else(PoisonError::into_inner);
+            let row = tile.rect.width().max(1) as usize;
+            for (plane, values) in planes.iter_mut().zip(&tile.channels) {
+                for (y, values) in (tile.rect.y0 as usize..).zip(values.chunks(row)) {
+                    let start = y * width + tile.rect.x0 as usize;
+                    plane[start..start + values.len()].copy_from_slice(values);
+                }
+            }
+            Ok(())
+        };
+        let options = RenderOptions { threads: self.threads, method: settings.method, ..RenderOptions::default() };
+        let control = Control { cancel: self.cancel, progress: None };
+        let report = render(&scene, self.shaders, &plan, &options, &control, &emit)?;
+        if report.script_errors.has_errors() {
+            return Err(report.script_errors);
+        }
+        if !report.complete || self.cancel.is_some_and(|cancel| cancel.load(Ordering::Relaxed)) {
+            return Ok(None);
+        }
+        let planes = planes.into_inner().unwrap_or_else(PoisonError::into_inner);
+        Ok(Some((shot(width, &planes), report.stats)))
+    }
+}
+
+/// Planes of `rgba`, `line`, and perhaps the lines of two kinds of paths.
+fn shot(width: usize, planes: &[Vec<f32>]) -> Shot {
+    let color = |i: usize| {
+        let white = 1.0 - planes[3][i];
+        [0, 1, 2].map(|axis| shown(planes[axis][i] + white))
+    };
+    let secondary = |reflection: &Vec<f32>, refraction: &Vec<f32>| {
+        reflection.iter().zip(refraction).map(|(a, b)| (a + b).min(1.0)).collect()
+    };
+    Shot {
+        width,
+        colors: (0..planes[0].len()).map(color).collect(),
+        coverage: planes.get(7).cloned().unwrap_or_default(),
+        secondary: planes.get(11).zip(planes.get(15)).map(|(a, b)| secondary(a, b)).unwrap_or_default(),
+    }
+}

@@ -1,0 +1,5 @@
+//! What accuracy costs: measures, ladders and reports.
+
+mod course;
+mod flip;
+mod ladder;
