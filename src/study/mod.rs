@@ -1,6 +1,6 @@
 //! What accuracy costs, and what is wrong with pictures, as numbers (DESIGN section 9).
 //!
-//! [`study`](run::study) renders a [`Ladder`] of settings for each [`Knob`] that matters to a scene, and compares every
+//! [`study()`] renders a [`Ladder`] of settings for each [`Knob`] that matters to a scene, and compares every
 //! picture with a reference: the scene without approximations, with many samples and seeds of its own. [`measure`] says what
 //! the errors are; [`report`] turns the outcome into a page.
 

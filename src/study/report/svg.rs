@@ -105,8 +105,14 @@ impl Axis {
     }
 
     fn at(&self, value: f64) -> f64 {
+        let (low, high) = (self.from.min(self.to), self.from.max(self.to));
+        self.place(value).clamp(low - 5.0, high + 5.0)
+    }
+
+    /// As [`Self::at`], also far outside.
+    fn place(&self, value: f64) -> f64 {
         let share = (libm::log10(value.max(1e-300)) - self.low) / (self.high - self.low);
-        self.from + share.clamp(-0.05, 1.05) * (self.to - self.from)
+        self.from + share * (self.to - self.from)
     }
 
     /// Round values, and whether each gets a text.
@@ -204,12 +210,20 @@ impl Plot<'_> {
             put(format!("<path class=\"front\" d=\"{path}H{right}\"/>"));
         }
         for power in &self.powers {
-            let at = |px: f64| format!("{:.1} {:.1}", x.at(px), y.at(power.at_one * libm::pow(px, power.slope)));
+            let place = |px: f64| [x.at(px), y.place(power.at_one * libm::pow(px, power.slope))];
+            let [start, end] = power.from.map(place);
+            // Cut where it leaves the plot, so that its slope stays true.
+            let along = |to: f64| ((to.clamp(TOP, bottom) - start[1]) / (end[1] - start[1])).clamp(0.0, 1.0);
+            let at = |share: f64| {
+                let share = if share.is_finite() { share } else { 0.0 };
+                let mix = |axis: usize| start[axis] + share * (end[axis] - start[axis]);
+                format!("{:.1} {:.1}", mix(0), mix(1))
+            };
             put(format!(
                 "<path class=\"{}\" d=\"M{}L{}\"><title>{}</title></path>",
                 power.class,
-                at(power.from[0]),
-                at(power.from[1]),
+                at(along(start[1])),
+                at(along(end[1])),
                 escape(&power.name)
             ));
         }
