@@ -252,6 +252,8 @@ fn bisected(count: usize) -> Vec<usize> {
             order.push(place);
         }
     };
+    add(0);
+    add(count.saturating_sub(1));
     let mut step = count.next_power_of_two().max(1);
     while step > 0 {
         (0..=count / step).for_each(|i| add((i * step).min(count.saturating_sub(1))));
