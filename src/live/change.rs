@@ -4,6 +4,7 @@
 //! touch. Where it is not certain that something stays as it was, it is done again.
 
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 use crate::plan::{LINE_SLICE, MaterialPlan, Plan};
 use crate::sample::SampleLayout;
@@ -91,8 +92,9 @@ impl Redo {
             redo.visibility = true;
             redo.shade = true;
         }
-        let lights = |view: View<'_>| view.scene.lights().to_vec();
-        if lights(old) != lights(new) && (old.plan.takes_light_samples() || new.plan.takes_light_samples()) {
+        if old.scene.lights() != new.scene.lights()
+            && (old.plan.takes_light_samples() || new.plan.takes_light_samples())
+        {
             redo.visibility = true;
             redo.shade = true;
         }
@@ -123,7 +125,6 @@ impl View<'_> {
 
 /// Whether rays that start alike meet the same surfaces.
 fn same_world(old: View<'_>, new: View<'_>) -> bool {
-    let meshes = |scene: &Scene| scene.meshes().to_vec();
     let (a, b) = (old.scene.objects(), new.scene.objects());
     let sided = |view: View<'_>| -> Vec<(bool, bool)> {
         let materials = view.scene.materials().iter().zip(&view.plan.materials);
@@ -137,10 +138,8 @@ fn same_world(old: View<'_>, new: View<'_>) -> bool {
                 && a.visible_to == b.visible_to
         })
         && sided(old) == sided(new)
-        && {
-            let (a, b) = (meshes(old.scene), meshes(new.scene));
-            a.len() == b.len() && a.iter().zip(&b).all(|(a, b)| std::sync::Arc::ptr_eq(a, b) || a == b)
-        }
+        && old.scene.meshes().len() == new.scene.meshes().len()
+        && old.scene.meshes().iter().zip(new.scene.meshes()).all(|(a, b)| Arc::ptr_eq(a, b) || a == b)
 }
 
 /// Whether of several surfaces at one place the same come first.

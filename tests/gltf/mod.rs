@@ -158,7 +158,7 @@ fn width(kind: &str) -> usize {
     }
 }
 
-fn glb(json: &[u8], binary: Option<&[u8]>) -> Vec<u8> {
+pub fn glb(json: &[u8], binary: Option<&[u8]>) -> Vec<u8> {
     let mut chunks = Vec::new();
     let parts = [(Some(json), b"JSON", b' '), (binary, b"BIN\0", 0)];
     for (bytes, kind, padding) in parts.into_iter().filter_map(|(bytes, kind, pad)| Some((bytes?, kind, pad))) {

@@ -31,7 +31,7 @@ fn median(times: &mut [f64]) -> f64 {
 }
 
 #[test]
-#[ignore = "a measurement"]
+#[ignore = "a measurement for people, not a check: run by hand, as README says under \"While you work\""]
 fn latency_of_edits() {
     let browser = Browser::start().expect("chromium and chromedriver are there");
     let place = Workplace::new();

@@ -10,6 +10,7 @@ use rayon::prelude::*;
 
 use super::count_from;
 use crate::common::root;
+use crate::gltf::glb;
 use crate::line::picture;
 
 /// Numbers from a seed.
@@ -155,30 +156,13 @@ fn models_give_a_scene_or_diagnostics() {
         if dice.below(3) > 0 {
             return text;
         }
-        let mut binary = binary(&text, &[7; 64]);
+        let mut binary = glb(&text, Some(&[7; 64]));
         if dice.below(2) == 0 {
             change(&mut binary, &texts, dice);
         }
         binary
     };
     run(1000, make, inputs::model);
-}
-
-/// A text as a `.glb` with a buffer.
-fn binary(json: &[u8], buffer: &[u8]) -> Vec<u8> {
-    let mut chunks = Vec::new();
-    for (bytes, kind, padding) in [(json, b"JSON", b' '), (buffer, b"BIN\0", 0)] {
-        let length = bytes.len().next_multiple_of(4);
-        chunks.extend((length as u32).to_le_bytes());
-        chunks.extend(kind);
-        chunks.extend(bytes);
-        chunks.resize(chunks.len() + length - bytes.len(), padding);
-    }
-    let mut file = b"glTF".to_vec();
-    file.extend(2_u32.to_le_bytes());
-    file.extend((chunks.len() as u32 + 12).to_le_bytes());
-    file.extend(chunks);
-    file
 }
 
 #[test]
