@@ -41,6 +41,20 @@ pub(super) fn largest(lanes: &Lanes) -> f32 {
     lanes.iter().fold(f32::NEG_INFINITY, |largest, &lane| max(largest, lane))
 }
 
+/// Vectors by axis, times a matrix.
+#[inline(always)]
+fn product(matrix: &Mat3, [x, y, z]: &[Lanes; 3]) -> [Lanes; 3] {
+    let [mx, my, mz] = matrix.to_cols_array_2d();
+    [0, 1, 2].map(|axis: usize| {
+        let (mx, my, mz) = (mx[axis], my[axis], mz[axis]);
+        let mut lanes = [0.0; LANES];
+        for i in 0..LANES {
+            lanes[i] = mx * x[i] + my * y[i] + mz * z[i];
+        }
+        lanes
+    })
+}
+
 /// The rays of a packet in one space.
 #[derive(Clone, Copy)]
 pub(super) struct LaneRays {
@@ -65,8 +79,9 @@ impl LaneRays {
         Some(Self::new(origin, direction))
     }
 
+    /// Rays by axis.
     #[inline(always)]
-    fn new(origin: [Lanes; 3], direction: [Lanes; 3]) -> Self {
+    pub fn new(origin: [Lanes; 3], direction: [Lanes; 3]) -> Self {
         let mut inverse = [[0.0; LANES]; 3];
         for (inverse, direction) in inverse.iter_mut().zip(&direction) {
             for i in 0..LANES {
@@ -81,18 +96,11 @@ impl LaneRays {
     /// The rays in the space of an object, as [`super::world::PlacedObject`] places single rays there.
     #[inline(always)]
     pub fn placed(&self, object_from_world: &Mat3, translation: Vec3) -> Self {
-        let m = object_from_world.to_cols_array_2d();
-        let mut origin = [[0.0; LANES]; 3];
-        let mut direction = [[0.0; LANES]; 3];
-        for axis in 0..3 {
-            for i in 0..LANES {
-                let [x, y, z] = [0, 1, 2].map(|k: usize| self.origin[k][i] - translation[k]);
-                origin[axis][i] = m[0][axis] * x + m[1][axis] * y + m[2][axis] * z;
-                let [x, y, z] = self.direction.map(|lanes| lanes[i]);
-                direction[axis][i] = m[0][axis] * x + m[1][axis] * y + m[2][axis] * z;
-            }
+        let mut from = self.origin;
+        for (lanes, translation) in from.iter_mut().zip(translation.to_array()) {
+            lanes.iter_mut().for_each(|lane| *lane -= translation);
         }
-        Self::new(origin, direction)
+        Self::new(product(object_from_world, &from), product(object_from_world, &self.direction))
     }
 
     /// Where one of the rays starts.
@@ -101,11 +109,17 @@ impl LaneRays {
         Vec3::from_array(self.origin.each_ref().map(|axis| axis[lane]))
     }
 
+    /// Origin and direction of one of the rays.
+    #[inline]
+    pub fn ray_start(&self, lane: usize) -> RayStart {
+        (self.start(lane), Vec3::from_array(self.direction.each_ref().map(|axis| axis[lane])))
+    }
+
     /// One of the rays, with its grain.
     #[inline]
     pub fn ray(&self, lane: usize, grain: Vec3) -> Ray {
-        let direction = Vec3::from_array(self.direction.each_ref().map(|axis| axis[lane]));
-        Ray { grain, ..Ray::new(self.start(lane), direction) }
+        let (origin, direction) = self.ray_start(lane);
+        Ray { grain, ..Ray::new(origin, direction) }
     }
 
     /// What the triangle test needs; `None` if the rays are no packet.

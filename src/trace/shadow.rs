@@ -87,7 +87,7 @@ impl TileTracer<'_> {
             .map(|(sample, ray, hit)| {
                 let (origin, direction) = (ray.origin, ray.direction);
                 let wave_ray = WaveRay { origin, direction, node: 0, after: None, passed: 0, media: 0, counted: 0 };
-                let surface = Surface::new(self.world, ray, hit);
+                let surface = Surface::new(self.world, ray.direction, hit);
                 let material = self.world.material(hit);
                 let hit =
                     WaveHit { ray: wave_ray, hit: *hit, surface, material, depth: hit.t, place: 0, crossing: None };

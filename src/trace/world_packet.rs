@@ -7,6 +7,7 @@ use super::packet::{self, DONE, LANES, LaneHits, LaneRays, Lanes, RayStart, Visi
 use super::triangle::Ray;
 use super::world::{Hit, PlacedObject, World};
 use crate::math::Vec3;
+use crate::scene::camera::CameraRays;
 use crate::scene::ids::ObjectId;
 use crate::scene::settings::RayKinds;
 
@@ -18,28 +19,59 @@ impl World {
     /// rays go much the same way.
     #[must_use]
     pub fn closest_of(&self, rays: &[RayStart], kind: RayKinds) -> [Option<Hit>; LANES] {
+        match LaneRays::of(rays) {
+            Some(packet) => self.closest_of_lanes(&packet, rays.len().min(LANES), kind),
+            None => [None; LANES],
+        }
+    }
+
+    /// The rays of a camera through film positions (pixels, and places in them), and the closest hits of the first of them.
+    pub(super) fn closest_of_camera(
+        &self,
+        camera: &CameraRays,
+        film: &[([i32; 2], [f32; 2]); LANES],
+        count: usize,
+    ) -> (LaneRays, [Option<Hit>; LANES]) {
+        let rays = self.arch.dispatch(FromCamera { camera, film });
+        (rays, self.closest_of_lanes(&rays, count, RayKinds::CAMERA))
+    }
+
+    fn closest_of_lanes(&self, rays: &LaneRays, count: usize, kind: RayKinds) -> [Option<Hit>; LANES] {
         let mut hits = [None; LANES];
-        let packet = if rays.len() < FEWEST { None } else { LaneRays::of(rays) };
-        let traced = packet.and_then(|packet| {
-            let found = Found::new(rays.len());
-            self.arch.dispatch(Closest { world: self, rays: &packet, kind, found })
-        });
+        let one = |lane: usize| {
+            let (origin, direction) = rays.ray_start(lane);
+            self.closest(&Ray::new(origin, direction), kind, f32::INFINITY)
+        };
+        let traced = (count >= FEWEST)
+            .then(|| self.arch.dispatch(Closest { world: self, rays, kind, found: Found::new(count) }))
+            .flatten();
         match traced {
+            // Most packets of the background meet nothing at all.
+            Some(found) if found.object == [Found::NONE; LANES] => {}
             Some(found) => {
-                for (lane, (hit, &(origin, direction))) in hits.iter_mut().zip(rays).enumerate() {
-                    *hit = match found.crowded[lane] {
-                        0 => found.hit(lane),
-                        _ => self.closest(&Ray::new(origin, direction), kind, f32::INFINITY),
-                    };
+                for (lane, hit) in hits[..count].iter_mut().enumerate() {
+                    *hit = if found.crowded[lane] == 0 { found.hit(lane) } else { one(lane) };
                 }
             }
-            None => {
-                for (hit, &(origin, direction)) in hits.iter_mut().zip(rays) {
-                    *hit = self.closest(&Ray::new(origin, direction), kind, f32::INFINITY);
-                }
-            }
+            None => hits[..count].iter_mut().enumerate().for_each(|(lane, hit)| *hit = one(lane)),
         }
         hits
+    }
+}
+
+/// Makes the rays of a camera.
+struct FromCamera<'a> {
+    camera: &'a CameraRays,
+    film: &'a [([i32; 2], [f32; 2]); LANES],
+}
+
+impl pulp::WithSimd for FromCamera<'_> {
+    type Output = LaneRays;
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) -> Self::Output {
+        let (origin, direction) = self.camera.rays(self.film);
+        LaneRays::new(origin, direction)
     }
 }
 
