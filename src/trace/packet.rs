@@ -284,6 +284,9 @@ pub(super) trait Visit {
     /// At least the largest component of any ray's origin and grain.
     fn size(&self) -> f32;
 
+    /// Whether a ray is taken not to meet a triangle.
+    fn leaves(&self, lane: usize, triangle: u32) -> bool;
+
     /// Takes the hits of one triangle.
     fn hit(&mut self, triangle: u32, hits: &LaneHits);
 }
@@ -298,7 +301,7 @@ pub(super) fn intersect(tree: &MeshTree, rays: &LaneRays, shear: &Shear, visit: 
             for block in tree.blocks(&leaf) {
                 for place in 0..WIDTH {
                     let Some((triangle, vertices)) = block.triangle(place) else { break };
-                    if let Some(hits) = shear.triangle(rays, visit, &vertices, &near, &limit) {
+                    if let Some(hits) = shear.triangle(rays, visit, (triangle, &vertices), &near, &limit) {
                         visit.hit(triangle, &hits);
                         let reach = visit.reach();
                         for i in 0..LANES {
@@ -320,7 +323,7 @@ impl Shear {
         &self,
         rays: &LaneRays,
         visit: &impl Visit,
-        vertices: &[Vec3; 3],
+        (id, vertices): (u32, &[Vec3; 3]),
         near: &Lanes,
         limit: &Lanes,
     ) -> Option<LaneHits> {
@@ -381,7 +384,7 @@ impl Shear {
             any |= side;
         }
         if any & LaneHits::SPECIAL != 0 {
-            any = ask(rays, visit, vertices, near, limit, &mut hits);
+            any = ask(rays, visit, (id, vertices), near, limit, &mut hits);
         }
         (any != 0).then_some(hits)
     }
@@ -392,7 +395,7 @@ impl Shear {
 fn ask(
     rays: &LaneRays,
     visit: &impl Visit,
-    vertices: &[Vec3; 3],
+    (id, vertices): (u32, &[Vec3; 3]),
     near: &Lanes,
     limit: &Lanes,
     hits: &mut LaneHits,
@@ -402,6 +405,9 @@ fn ask(
             continue;
         }
         hits.side[i] = LaneHits::NONE;
+        if visit.leaves(i, id) {
+            continue;
+        }
         if let Some(hit) = rays.ray(i, visit.grain(i)).triangle(vertices, limit[i]) {
             let t = hit.t.max(near[i]);
             if t <= limit[i] {

@@ -1,14 +1,14 @@
-//! Packets of rays through the world. What they find is what [`World::closest`] finds of each ray, bit for bit.
-//!
-//! Shadow rays do not go in packets: those stop later than single rays, which end at the first thing they meet, and were
-//! measured three times as slow (`tests/bench/README.md`).
+//! Packets of rays through the world. What they find is what [`World::closest`] and [`World::blocked`] find of each ray, bit for
+//! bit.
 
 use super::packet::{self, DONE, LANES, LaneHits, LaneRays, Lanes, RayStart, Visit, intersect, largest};
 use super::triangle::Ray;
-use super::world::{Hit, PlacedObject, World};
+use smallvec::SmallVec;
+
+use super::world::{Facet, Hit, PlacedObject, World};
 use crate::math::Vec3;
 use crate::scene::camera::CameraRays;
-use crate::scene::ids::ObjectId;
+use crate::scene::ids::{MaterialId, ObjectId};
 use crate::scene::settings::RayKinds;
 
 /// Fewer rays are traced one by one.
@@ -34,6 +34,24 @@ impl World {
     ) -> (LaneRays, [Option<Hit>; LANES]) {
         let rays = self.arch.dispatch(FromCamera { camera, film });
         (rays, self.closest_of_lanes(&rays, count, RayKinds::CAMERA))
+    }
+
+    /// What is in the way of at most [`LANES`] shadow rays, as [`Self::blocked`] finds it one by one.
+    #[must_use]
+    pub fn blocked_of(&self, rays: &[ShadowRay], opaque: &impl Fn(MaterialId) -> bool) -> [Way; LANES] {
+        let mut ways = [Way::Unknown; LANES];
+        let starts: SmallVec<[RayStart; LANES]> = rays.iter().map(|ray| ray.start).collect();
+        if rays.len() < FEWEST {
+            return ways;
+        }
+        let Some(packet) = LaneRays::of(&starts) else { return ways };
+        let mut reach = [DONE; LANES];
+        reach.iter_mut().zip(rays).for_each(|(reach, ray)| *reach = ray.reach);
+        let search = Blocked { world: self, rays: &packet, shadow: rays, opaque, reach };
+        if let Some(found) = self.arch.dispatch(search) {
+            ways = found;
+        }
+        ways
     }
 
     fn closest_of_lanes(&self, rays: &LaneRays, count: usize, kind: RayKinds) -> [Option<Hit>; LANES] {
@@ -211,6 +229,11 @@ impl Visit for InObject<'_> {
     }
 
     #[inline(always)]
+    fn leaves(&self, _: usize, _: u32) -> bool {
+        false
+    }
+
+    #[inline(always)]
     fn hit(&mut self, triangle: u32, hits: &LaneHits) {
         let single_sided = self.culls && self.object.single_sided[self.object.slot(triangle)];
         self.found.take(hits, self.near, self.id, triangle, single_sided);
@@ -244,5 +267,117 @@ impl pulp::WithSimd for Closest<'_> {
             },
         )?;
         Some(found)
+    }
+}
+
+/// A ray towards a light.
+#[derive(Clone, Copy, Debug)]
+pub struct ShadowRay {
+    /// Origin and direction.
+    pub start: RayStart,
+    /// How far the light is, in lengths of the direction.
+    pub reach: f32,
+    /// The triangle that it leaves, which it does not meet.
+    pub leaves: Facet,
+}
+
+/// What a packet knows of a shadow ray's way.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Way {
+    /// Nothing is in it.
+    Clear,
+    /// Something opaque is.
+    Blocked,
+    /// Nothing opaque is, but other things may be; or nobody looked.
+    Unknown,
+}
+
+struct Blocked<'a, O> {
+    world: &'a World,
+    rays: &'a LaneRays,
+    shadow: &'a [ShadowRay],
+    opaque: &'a O,
+    reach: Lanes,
+}
+
+/// How far rays reach that nothing has blocked yet, and what they have met.
+struct Ways {
+    reach: Lanes,
+    ways: [Way; LANES],
+}
+
+/// Looks for anything in one object.
+struct AnyInObject<'a, O> {
+    found: &'a mut Ways,
+    id: u32,
+    object: &'a PlacedObject,
+    rays: &'a LaneRays,
+    shadow: &'a [ShadowRay],
+    opaque: &'a O,
+    size: f32,
+    reach: Lanes,
+}
+
+impl<O: Fn(MaterialId) -> bool> Visit for AnyInObject<'_, O> {
+    #[inline(always)]
+    fn reach(&self) -> &Lanes {
+        &self.reach
+    }
+
+    #[inline]
+    fn grain(&self, lane: usize) -> Vec3 {
+        self.object.grain(self.rays.start(lane))
+    }
+
+    #[inline(always)]
+    fn size(&self) -> f32 {
+        self.size
+    }
+
+    #[inline(always)]
+    fn leaves(&self, lane: usize, triangle: u32) -> bool {
+        self.shadow.get(lane).is_some_and(|ray| ray.leaves == (ObjectId(self.id), triangle))
+    }
+
+    #[inline(always)]
+    fn hit(&mut self, triangle: u32, hits: &LaneHits) {
+        let opaque = (self.opaque)(self.object.materials[self.object.slot(triangle)]);
+        for lane in 0..LANES {
+            if hits.side[lane] == LaneHits::NONE || self.leaves(lane, triangle) {
+                continue;
+            }
+            self.found.ways[lane] = if opaque { Way::Blocked } else { Way::Unknown };
+            if opaque {
+                self.found.reach[lane] = DONE;
+                self.reach[lane] = DONE;
+            }
+        }
+    }
+}
+
+impl<O: Fn(MaterialId) -> bool> pulp::WithSimd for Blocked<'_, O> {
+    type Output = Option<[Way; LANES]>;
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) -> Self::Output {
+        let Self { world, rays, shadow, opaque, reach } = self;
+        let mut found = Ways { reach, ways: [Way::Clear; LANES] };
+        let farthest = largest_start(rays);
+        each_object(
+            world,
+            rays,
+            RayKinds::SHADOW,
+            &mut found,
+            |found| &found.reach,
+            |found, id, object, placed, _, limit| {
+                let size = largest_start(placed).max(object.grain(Vec3::splat(farthest)).max_element());
+                let mut search = AnyInObject { found, id, object, rays, shadow, opaque, size, reach: limit };
+                match placed.shear() {
+                    Some(shear) => intersect(&object.tree, placed, &shear, &mut search),
+                    None => packet::one_by_one(&object.tree, placed, &mut search),
+                }
+            },
+        )?;
+        Some(found.ways)
     }
 }
