@@ -9,7 +9,7 @@
 //! (`LaneRays::shear`) and are traced one at a time.
 
 use super::mesh_tree::{MeshTree, WIDTH};
-use super::tree::{BOX_FAR_SCALE, BOX_NEAR_SCALE, Leaf, Slabs};
+use super::tree::{BOX_FAR_SCALE, BOX_NEAR_SCALE, Leaf, Slabs, Visitor};
 use super::triangle::{MOST_SLACK, NOT_AHEAD, Ray, normal_and_size};
 use crate::math::{Mat3, Vec3, Vec4};
 
@@ -295,13 +295,27 @@ pub(super) trait Visit {
 #[inline(always)]
 pub(super) fn intersect(tree: &MeshTree, rays: &LaneRays, shear: &Shear, visit: &mut impl Visit) {
     let mut farthest = largest(visit.reach());
-    tree.tree().walk(&rays.bundle(), &mut farthest, |leaf, farthest| {
+    tree.tree().walk(&rays.bundle(), &mut farthest, InLeaf { tree, rays, shear, visit });
+}
+
+/// Looks at the triangles of leaves.
+struct InLeaf<'a, V> {
+    tree: &'a MeshTree,
+    rays: &'a LaneRays,
+    shear: &'a Shear,
+    visit: &'a mut V,
+}
+
+impl<V: Visit> Visitor for InLeaf<'_, V> {
+    #[inline(always)]
+    fn leaf(&mut self, leaf: Leaf<'_>, farthest: &mut f32) -> bool {
+        let Self { tree, rays, shear, visit } = self;
         let (near, mut limit, any) = rays.enter(&leaf, visit.reach());
         if any {
             for block in tree.blocks(&leaf) {
                 for place in 0..WIDTH {
                     let Some((triangle, vertices)) = block.triangle(place) else { break };
-                    if let Some(hits) = shear.triangle(rays, visit, (triangle, &vertices), &near, &limit) {
+                    if let Some(hits) = shear.triangle(rays, *visit, (triangle, &vertices), &near, &limit) {
                         visit.hit(triangle, &hits);
                         let reach = visit.reach();
                         for i in 0..LANES {
@@ -313,7 +327,7 @@ pub(super) fn intersect(tree: &MeshTree, rays: &LaneRays, shear: &Shear, visit: 
             *farthest = largest(visit.reach());
         }
         *farthest >= 0.0
-    });
+    }
 }
 
 impl Shear {

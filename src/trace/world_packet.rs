@@ -2,6 +2,7 @@
 //! bit.
 
 use super::packet::{self, DONE, LANES, LaneHits, LaneRays, Lanes, RayStart, Visit, intersect, largest};
+use super::tree::{Leaf, Visitor};
 use super::triangle::Ray;
 use smallvec::SmallVec;
 
@@ -156,35 +157,50 @@ impl Found {
     }
 }
 
-/// Shows each object that rays of a packet may meet to `each`: its id, the rays in its space, where its box is entered, and
-/// how far rays reach in it. `each` gets and changes what is found, whose reach `reach` tells. `None` if the rays are no packet.
+/// Looks for something in the objects that rays of a packet may meet.
+trait Search {
+    /// How far each ray reaches now.
+    fn reach(&self) -> &Lanes;
+
+    /// Looks at an object of a number: with the rays in its space, where they enter its box, and how far they reach in it.
+    fn object(&mut self, id: u32, object: &PlacedObject, placed: &LaneRays, near: &Lanes, limit: Lanes);
+}
+
+/// Shows each object that rays of a packet may meet to `search`. `None` if the rays are no packet.
 #[inline(always)]
-fn each_object<F>(
-    world: &World,
-    rays: &LaneRays,
-    kind: RayKinds,
-    found: &mut F,
-    reach: impl Fn(&F) -> &Lanes,
-    mut each: impl FnMut(&mut F, u32, &PlacedObject, &LaneRays, &Lanes, Lanes),
-) -> Option<()> {
+fn each_object(world: &World, rays: &LaneRays, kind: RayKinds, search: &mut impl Search) -> Option<()> {
     rays.shear()?;
-    let mut farthest = largest(reach(found));
-    world.tree.walk(&rays.bundle(), &mut farthest, |leaf, farthest| {
-        let (near, _, any) = rays.enter(&leaf, reach(found));
+    let mut farthest = largest(search.reach());
+    world.tree.walk(&rays.bundle(), &mut farthest, Objects { world, rays, kind, search });
+    Some(())
+}
+
+/// Looks at the objects of leaves.
+struct Objects<'a, S> {
+    world: &'a World,
+    rays: &'a LaneRays,
+    kind: RayKinds,
+    search: &'a mut S,
+}
+
+impl<S: Search> Visitor for Objects<'_, S> {
+    #[inline(always)]
+    fn leaf(&mut self, leaf: Leaf<'_>, farthest: &mut f32) -> bool {
+        let Self { world, rays, kind, search } = self;
+        let (near, _, any) = rays.enter(&leaf, search.reach());
         if any {
             for id in &world.tree.order[leaf.range()] {
                 let object = &world.objects[*id as usize];
-                if object.visible_to.contains(kind) {
-                    let (_, limit, _) = rays.enter(&leaf, reach(found));
+                if object.visible_to.contains(*kind) {
+                    let (_, limit, _) = rays.enter(&leaf, search.reach());
                     let placed = rays.placed(&object.object_from_world, object.translation);
-                    each(found, *id, object, &placed, &near, limit);
+                    search.object(*id, object, &placed, &near, limit);
                 }
             }
-            *farthest = largest(reach(found));
+            *farthest = largest(search.reach());
         }
         *farthest >= 0.0
-    });
-    Some(())
+    }
 }
 
 /// The largest component of any ray's origin.
@@ -198,6 +214,33 @@ struct Closest<'a> {
     rays: &'a LaneRays,
     kind: RayKinds,
     found: Found,
+}
+
+/// Looks for the nearest hits.
+struct Nearest<'a> {
+    rays: &'a LaneRays,
+    culls: bool,
+    /// The largest component of any ray's origin.
+    farthest: f32,
+    found: Found,
+}
+
+impl Search for Nearest<'_> {
+    #[inline(always)]
+    fn reach(&self) -> &Lanes {
+        &self.found.reach
+    }
+
+    #[inline(always)]
+    fn object(&mut self, id: u32, object: &PlacedObject, placed: &LaneRays, near: &Lanes, reach: Lanes) {
+        let size = largest_start(placed).max(object.grain(Vec3::splat(self.farthest)).max_element());
+        let (rays, culls, found) = (self.rays, self.culls, &mut self.found);
+        let mut search = InObject { found, id, object, rays, size, culls, near, reach };
+        match placed.shear() {
+            Some(shear) => intersect(&object.tree, placed, &shear, &mut search),
+            None => packet::one_by_one(&object.tree, placed, &mut search),
+        }
+    }
 }
 
 /// Looks for the nearest hits in one object.
@@ -248,25 +291,11 @@ impl pulp::WithSimd for Closest<'_> {
 
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) -> Self::Output {
-        let Self { world, rays, kind, mut found } = self;
+        let Self { world, rays, kind, found } = self;
         let culls = kind != RayKinds::SHADOW;
-        let farthest = largest_start(rays);
-        each_object(
-            world,
-            rays,
-            kind,
-            &mut found,
-            |found| &found.reach,
-            |found, id, object, placed, near, limit| {
-                let size = largest_start(placed).max(object.grain(Vec3::splat(farthest)).max_element());
-                let mut search = InObject { found, id, object, rays, size, culls, near, reach: limit };
-                match placed.shear() {
-                    Some(shear) => intersect(&object.tree, placed, &shear, &mut search),
-                    None => packet::one_by_one(&object.tree, placed, &mut search),
-                }
-            },
-        )?;
-        Some(found)
+        let mut search = Nearest { rays, culls, farthest: largest_start(rays), found };
+        each_object(world, rays, kind, &mut search)?;
+        Some(search.found)
     }
 }
 
@@ -300,25 +329,45 @@ struct Blocked<'a, O> {
     reach: Lanes,
 }
 
-/// How far rays reach that nothing has blocked yet, and what they have met.
-struct Ways {
+/// Looks for anything in the way.
+struct Ways<'a, O> {
+    rays: &'a LaneRays,
+    shadow: &'a [ShadowRay],
+    opaque: &'a O,
+    /// The largest component of any ray's origin.
+    farthest: f32,
+    /// How far rays reach that nothing has blocked yet.
     reach: Lanes,
     ways: [Way; LANES],
 }
 
+impl<O: Fn(MaterialId) -> bool> Search for Ways<'_, O> {
+    #[inline(always)]
+    fn reach(&self) -> &Lanes {
+        &self.reach
+    }
+
+    #[inline(always)]
+    fn object(&mut self, id: u32, object: &PlacedObject, placed: &LaneRays, _: &Lanes, reach: Lanes) {
+        let size = largest_start(placed).max(object.grain(Vec3::splat(self.farthest)).max_element());
+        let mut search = AnyInObject { id, object, size, reach, found: self };
+        match placed.shear() {
+            Some(shear) => intersect(&object.tree, placed, &shear, &mut search),
+            None => packet::one_by_one(&object.tree, placed, &mut search),
+        }
+    }
+}
+
 /// Looks for anything in one object.
-struct AnyInObject<'a, O> {
-    found: &'a mut Ways,
+struct AnyInObject<'a, 'w, O> {
+    found: &'a mut Ways<'w, O>,
     id: u32,
     object: &'a PlacedObject,
-    rays: &'a LaneRays,
-    shadow: &'a [ShadowRay],
-    opaque: &'a O,
     size: f32,
     reach: Lanes,
 }
 
-impl<O: Fn(MaterialId) -> bool> Visit for AnyInObject<'_, O> {
+impl<O: Fn(MaterialId) -> bool> Visit for AnyInObject<'_, '_, O> {
     #[inline(always)]
     fn reach(&self) -> &Lanes {
         &self.reach
@@ -326,7 +375,7 @@ impl<O: Fn(MaterialId) -> bool> Visit for AnyInObject<'_, O> {
 
     #[inline]
     fn grain(&self, lane: usize) -> Vec3 {
-        self.object.grain(self.rays.start(lane))
+        self.object.grain(self.found.rays.start(lane))
     }
 
     #[inline(always)]
@@ -336,12 +385,12 @@ impl<O: Fn(MaterialId) -> bool> Visit for AnyInObject<'_, O> {
 
     #[inline(always)]
     fn leaves(&self, lane: usize, triangle: u32) -> bool {
-        self.shadow.get(lane).is_some_and(|ray| ray.leaves == (ObjectId(self.id), triangle))
+        self.found.shadow.get(lane).is_some_and(|ray| ray.leaves == (ObjectId(self.id), triangle))
     }
 
     #[inline(always)]
     fn hit(&mut self, triangle: u32, hits: &LaneHits) {
-        let opaque = (self.opaque)(self.object.materials[self.object.slot(triangle)]);
+        let opaque = (self.found.opaque)(self.object.materials[self.object.slot(triangle)]);
         for lane in 0..LANES {
             if hits.side[lane] == LaneHits::NONE || self.leaves(lane, triangle) {
                 continue;
@@ -361,23 +410,9 @@ impl<O: Fn(MaterialId) -> bool> pulp::WithSimd for Blocked<'_, O> {
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) -> Self::Output {
         let Self { world, rays, shadow, opaque, reach } = self;
-        let mut found = Ways { reach, ways: [Way::Clear; LANES] };
         let farthest = largest_start(rays);
-        each_object(
-            world,
-            rays,
-            RayKinds::SHADOW,
-            &mut found,
-            |found| &found.reach,
-            |found, id, object, placed, _, limit| {
-                let size = largest_start(placed).max(object.grain(Vec3::splat(farthest)).max_element());
-                let mut search = AnyInObject { found, id, object, rays, shadow, opaque, size, reach: limit };
-                match placed.shear() {
-                    Some(shear) => intersect(&object.tree, placed, &shear, &mut search),
-                    None => packet::one_by_one(&object.tree, placed, &mut search),
-                }
-            },
-        )?;
-        Some(found.ways)
+        let mut search = Ways { rays, shadow, opaque, farthest, reach, ways: [Way::Clear; LANES] };
+        each_object(world, rays, RayKinds::SHADOW, &mut search)?;
+        Some(search.ways)
     }
 }
