@@ -152,7 +152,8 @@ mod tests {
             for y in rect.y0 - reach..rect.y1 + reach {
                 for x in rect.x0 - reach..rect.x1 + reach {
                     let targets = PixelRect { x0: x, y0: y, x1: x + 1, y1: y + 1 }.grown(reach).intersection(&rect);
-                    let mut reached = (targets.y0..targets.y1).flat_map(|y| (targets.x0..targets.x1).map(move |x| [x, y]));
+                    let mut reached =
+                        (targets.y0..targets.y1).flat_map(|y| (targets.x0..targets.x1).map(move |x| [x, y]));
                     let reaches = reached.any(|pixel| ground.value(pixel, 0).is_none());
                     assert_eq!(ground.is_filtered([x, y]), reaches, "case {case} at {x}, {y}");
                 }

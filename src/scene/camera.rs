@@ -155,10 +155,8 @@ impl CameraRays {
         let (mut x, mut y) = ([0.0; N], [0.0; N]);
         for lane in 0..N {
             let (pixel, offset) = film[lane];
-            x[lane] =
-                (f64::from(pixel[0]) - width / 2.0 + f64::from(offset[0]) + shift.x) / (height / 2.0) * half;
-            y[lane] =
-                -(f64::from(pixel[1]) - height / 2.0 + f64::from(offset[1]) + shift.y) / (height / 2.0) * half;
+            x[lane] = (f64::from(pixel[0]) - width / 2.0 + f64::from(offset[0]) + shift.x) / (height / 2.0) * half;
+            y[lane] = -(f64::from(pixel[1]) - height / 2.0 + f64::from(offset[1]) + shift.y) / (height / 2.0) * half;
         }
         // One plain loop for each step: others do not vectorise.
         let along = |axis: usize| {
@@ -197,7 +195,8 @@ mod tests {
         ];
         for projection in projections {
             let (from, target) = (DVec3::new(0.3, -7.1, 2.2), DVec3::new(0.1, 0.2, -0.3));
-            let camera = Camera::look_at("", projection, from, target, DVec3::Y).unwrap_or_else(|error| panic!("{error:?}"));
+            let camera =
+                Camera::look_at("", projection, from, target, DVec3::Y).unwrap_or_else(|error| panic!("{error:?}"));
             let rays = Camera { film_shift: DVec2::new(0.25, -3.5), ..camera }.rays([1921, 1079]);
             let film: [_; 16] = std::array::from_fn(|lane| {
                 let lane = lane as i32;

@@ -139,7 +139,20 @@ impl Run {
     /// Empties the run and keeps its memory.
     pub fn clear(&mut self) {
         // The record is told whether it is wanted.
-        let Self { offsets, nodes, attributes, again, next, behind, surfaces, media, crossings, positions, aovs, record: _ } = self;
+        let Self {
+            offsets,
+            nodes,
+            attributes,
+            again,
+            next,
+            behind,
+            surfaces,
+            media,
+            crossings,
+            positions,
+            aovs,
+            record: _,
+        } = self;
         offsets.clear();
         nodes.clear();
         attributes.clear();

@@ -81,22 +81,20 @@ impl TileTracer<'_> {
 
     /// Sends rays towards a light, each for the light sample of a number: what is surely blocked becomes invisible, and what
     /// see-through surfaces are passed is noted.
-    fn cast(
-        &self,
-        rays: &[(usize, ShadowRay)],
-        samples: &mut [LightSample],
-        see_through: &mut Vec<(usize, Ray, Hit)>,
-    ) {
+    fn cast(&self, rays: &[(usize, ShadowRay)], samples: &mut [LightSample], see_through: &mut Vec<(usize, Ray, Hit)>) {
         let opaque = |id: MaterialId| self.plan.materials[id.index()].blocks_light();
         let packet: SmallVec<[ShadowRay; LANES]> = rays.iter().map(|(_, ray)| *ray).collect();
         let mut passed = Vec::new();
-        for (&(place, ShadowRay { start, reach, leaves }), way) in rays.iter().zip(self.world.blocked_of(&packet, &opaque)) {
-            let blocked = way == Way::Blocked || way == Way::Unknown && {
-                let ray = Ray::new(start.0, start.1);
-                let blocked = self.world.blocked(&ray, reach, Some(leaves), opaque, &mut passed);
-                see_through.extend(passed.iter().filter(|_| !blocked).map(|hit| (place, ray, *hit)));
-                blocked
-            };
+        for (&(place, ShadowRay { start, reach, leaves }), way) in
+            rays.iter().zip(self.world.blocked_of(&packet, &opaque))
+        {
+            let blocked = way == Way::Blocked
+                || way == Way::Unknown && {
+                    let ray = Ray::new(start.0, start.1);
+                    let blocked = self.world.blocked(&ray, reach, Some(leaves), opaque, &mut passed);
+                    see_through.extend(passed.iter().filter(|_| !blocked).map(|hit| (place, ray, *hit)));
+                    blocked
+                };
             if blocked {
                 samples[place].visibility = 0.0;
             }

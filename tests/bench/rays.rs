@@ -16,14 +16,14 @@ use rayon::prelude::*;
 use tusche::clock::CpuClock;
 use tusche::files::FileStore;
 use tusche::math::Vec3;
+use tusche::scene::ids::ObjectId;
 use tusche::scene::settings::RayKinds;
 use tusche::scene::{Scene, file};
 use tusche::trace::World;
-use tusche::scene::ids::ObjectId;
 use tusche::trace::packet::{LANES, RayStart};
-use tusche::trace::world_packet::{ShadowRay, Way};
 use tusche::trace::surface::Surface;
 use tusche::trace::triangle::Ray;
+use tusche::trace::world_packet::{ShadowRay, Way};
 
 const SIZE: [u32; 2] = [1280, 720];
 /// Side of the blocks of pixels in which rays are ordered.
