@@ -203,12 +203,6 @@ impl<S: Search> Visitor for Objects<'_, S> {
     }
 }
 
-/// The largest component of any ray's origin.
-#[inline(always)]
-fn largest_start(rays: &LaneRays) -> f32 {
-    rays.origin.iter().flatten().fold(0.0, |largest, lane| if lane.abs() > largest { lane.abs() } else { largest })
-}
-
 struct Closest<'a> {
     world: &'a World,
     rays: &'a LaneRays,
@@ -233,7 +227,7 @@ impl Search for Nearest<'_> {
 
     #[inline(always)]
     fn object(&mut self, id: u32, object: &PlacedObject, placed: &LaneRays, near: &Lanes, reach: Lanes) {
-        let size = largest_start(placed).max(object.grain(Vec3::splat(self.farthest)).max_element());
+        let size = placed.largest_start().max(object.grain(Vec3::splat(self.farthest)).max_element());
         let (rays, culls, found) = (self.rays, self.culls, &mut self.found);
         let mut search = InObject { found, id, object, rays, size, culls, near, reach };
         match placed.shear() {
@@ -293,7 +287,7 @@ impl pulp::WithSimd for Closest<'_> {
     fn with_simd<S: pulp::Simd>(self, _: S) -> Self::Output {
         let Self { world, rays, kind, found } = self;
         let culls = kind != RayKinds::SHADOW;
-        let mut search = Nearest { rays, culls, farthest: largest_start(rays), found };
+        let mut search = Nearest { rays, culls, farthest: rays.largest_start(), found };
         each_object(world, rays, kind, &mut search)?;
         Some(search.found)
     }
@@ -349,7 +343,7 @@ impl<O: Fn(MaterialId) -> bool> Search for Ways<'_, O> {
 
     #[inline(always)]
     fn object(&mut self, id: u32, object: &PlacedObject, placed: &LaneRays, _: &Lanes, reach: Lanes) {
-        let size = largest_start(placed).max(object.grain(Vec3::splat(self.farthest)).max_element());
+        let size = placed.largest_start().max(object.grain(Vec3::splat(self.farthest)).max_element());
         let mut search = AnyInObject { id, object, size, reach, found: self };
         match placed.shear() {
             Some(shear) => intersect(&object.tree, placed, &shear, &mut search),
@@ -410,7 +404,7 @@ impl<O: Fn(MaterialId) -> bool> pulp::WithSimd for Blocked<'_, O> {
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) -> Self::Output {
         let Self { world, rays, shadow, opaque, reach } = self;
-        let farthest = largest_start(rays);
+        let farthest = rays.largest_start();
         let mut search = Ways { rays, shadow, opaque, farthest, reach, ways: [Way::Clear; LANES] };
         each_object(world, rays, RayKinds::SHADOW, &mut search)?;
         Some(search.ways)
