@@ -66,13 +66,16 @@ impl TileTracer<'_> {
         context: &TraceContext<'_>,
     ) -> Option<(SmallVec<[Bsdf; LANES]>, BsdfLanes)> {
         let material = hits.first()?.material;
-        if !self.plan.color || !self.plan.bodies.is_empty() || !self.outputs_of(material, first, context).batch.color.is_empty() {
+        if !self.plan.color || !self.plan.bodies.is_empty() {
             return None;
         }
         let mut bsdfs = SmallVec::new();
         let mut lanes = BsdfLanes::default();
         for (lane, hit) in hits.iter().enumerate() {
             let outputs = self.outputs_of(material, first + lane, context);
+            if value(&outputs.batch.color, outputs.row, None).is_some() {
+                return None;
+            }
             let bsdf = self.bsdf(hit, outputs, 1.0);
             let direction = hit.ray.direction;
             let emission = value(&outputs.batch.emission, outputs.row, Vec3::ZERO);

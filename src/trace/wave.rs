@@ -31,7 +31,7 @@ use crate::shade::batch::{HitBatch, OutputBatch};
 use crate::shade::{Lighting, LineStyles, OutputSet, PathKind, ShadeErrors, Shaders, Shading};
 
 /// Samples of a run of pixels that are traced together.
-const RUN_SAMPLES: usize = 4096;
+const RUN_SAMPLES: usize = 2048;
 /// The same where rays branch, so that even deep trees of mirrors and glass stay small in memory.
 const RUN_SAMPLES_BRANCHING: usize = 1024;
 /// Most surfaces of opacity 0 that a ray passes before it is taken to leave the scene.
