@@ -14,6 +14,9 @@ use crate::scene::settings::RayKinds;
 
 /// Fewer rays are traced one by one.
 const FEWEST: usize = 4;
+/// Shadow rays that leave another triangle than the ray before them, at most: where triangles are as small as rays are far apart,
+/// each ray of a packet enters leaves of its own, for which all have to be asked, and that was measured five times as slow.
+const MOST_CHANGES: usize = 6;
 
 impl World {
     /// The closest hits of at most [`LANES`] rays of one kind, as [`Self::closest`] finds them one by one. Quickest where the
@@ -37,12 +40,14 @@ impl World {
         (rays, self.closest_of_lanes(&rays, count, RayKinds::CAMERA))
     }
 
-    /// What is in the way of at most [`LANES`] shadow rays, as [`Self::blocked`] finds it one by one.
+    /// What is in the way of at most [`LANES`] shadow rays, as [`Self::blocked`] finds it one by one. Those that have little in
+    /// common are not looked at.
     #[must_use]
     pub fn blocked_of(&self, rays: &[ShadowRay], opaque: &impl Fn(MaterialId) -> bool) -> [Way; LANES] {
         let mut ways = [Way::Unknown; LANES];
         let starts: SmallVec<[RayStart; LANES]> = rays.iter().map(|ray| ray.start).collect();
-        if rays.len() < FEWEST {
+        if rays.len() < FEWEST || rays.windows(2).filter(|pair| pair[0].leaves != pair[1].leaves).count() > MOST_CHANGES
+        {
             return ways;
         }
         let Some(packet) = LaneRays::of(&starts) else { return ways };

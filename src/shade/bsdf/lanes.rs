@@ -175,8 +175,19 @@ impl BsdfLanes {
 
     #[inline(always)]
     fn add_surroundings(&mut self, ambient: Vec3) {
-        let Self { base_color, metallic, roughness, specular, f0, transmission, normal, occlusion, view, mirrored, radiance } =
-            self;
+        let Self {
+            base_color,
+            metallic,
+            roughness,
+            specular,
+            f0,
+            transmission,
+            normal,
+            occlusion,
+            view,
+            mirrored,
+            radiance,
+        } = self;
         let [[nx, ny, nz], [vx, vy, vz]] = [&*normal, &*view];
         let mut sums = *radiance;
         let [red, green, blue] = &mut sums;
@@ -253,7 +264,13 @@ mod tests {
     fn bsdf() -> impl Strategy<Value = Bsdf> {
         let numbers = (share(), share(), share(), 0.2f32..3.0, share(), share());
         (color(), numbers, direction(), any::<bool>(), prop_oneof![Just(1.0f32), 0.5f32..2.0]).prop_map(
-            |(base_color, (metallic, roughness, specular, ior, transmission, occlusion), normal, outside, surrounding)| {
+            |(
+                base_color,
+                (metallic, roughness, specular, ior, transmission, occlusion),
+                normal,
+                outside,
+                surrounding,
+            )| {
                 let bsdf = Bsdf {
                     base_color,
                     metallic,
