@@ -34,8 +34,12 @@ pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Polygons, Diagnostic> {
                 Some(vertex) => *vertex,
                 None => {
                     let missing = |what: &str, index: usize, count: usize| {
-                        let message =
-                            format!("face {} (from 1) uses {what} {}, but there are {count}", number + 1, index + 1);
+                        // Counted back from the last, it may lie before the first.
+                        let which = isize::try_from(index).map_or_else(
+                            |_| format!("a {what} before the first"),
+                            |index| format!("{what} {}", index.saturating_add(1)),
+                        );
+                        let message = format!("face {} (from 1) uses {which}, but there are {count}", number + 1);
                         Diagnostic::error(message).in_file(path)
                     };
                     let at = |what, list: &[[f32; 3]], index: usize| {
