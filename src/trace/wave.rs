@@ -148,7 +148,7 @@ impl<'a> TileTracer<'a> {
             plan,
             world,
             lighting,
-            positions: SamplePositions::new(settings.samples, settings.seed),
+            positions: SamplePositions::new(settings.sampler, settings.samples, settings.seed),
             rays: scene.camera().rays(settings.size),
             transparent: settings.background == Background::Transparent,
             stand_ins: scene.stand_ins(),
@@ -220,8 +220,9 @@ impl<'a> TileTracer<'a> {
         for index in pixels {
             let width = rect.width() as usize;
             let pixel = [rect.x0 + (index % width) as i32, rect.y0 + (index / width) as i32];
+            let positions = self.positions.of_pixel(pixel);
             for sample in 0..per_pixel {
-                let offset = self.positions.offset(pixel, sample);
+                let offset = positions.offset(sample);
                 let (origin, direction) = self.rays.ray(pixel, offset);
                 let node = run.nodes.len() as u32;
                 run.next.push(WaveRay { origin, direction, node, after: None, passed: 0, media: 0, counted: 0 });

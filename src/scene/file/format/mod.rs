@@ -53,6 +53,8 @@ pub(super) struct Render {
     /// Samples per pixel.
     #[schemars(range(min = 1, max = MAX_SAMPLES))]
     pub samples: u32,
+    /// How samples are spread over a pixel.
+    pub sampler: Sampler,
     /// Chooses the sample positions; the same seed gives the same picture, bit for bit.
     pub seed: u64,
     /// What rays that leave the scene see.
@@ -80,6 +82,7 @@ impl Default for Render {
         Self {
             size: [1280, 720],
             samples: 16,
+            sampler: Sampler::Stratified,
             seed: 0,
             background: Background::Color(Color([0.9; 3])),
             ambient: Ambient::Gray(0.2),
@@ -144,6 +147,18 @@ pub(super) struct BackgroundImage {
     #[serde(default = "one")]
     #[schemars(range(min = 0, max = BRIGHT))]
     pub strength: f64,
+}
+
+/// How samples are spread over a pixel.
+#[derive(Clone, Copy, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum Sampler {
+    /// Each somewhere in a cell of its own.
+    Stratified,
+    /// Points of an Owen-scrambled Sobol sequence; best for 1, 2, 4, 8, 16, … samples.
+    Sobol,
+    /// The same from one sequence for all pixels, so that neighbours make up for each other's errors.
+    BlueNoise,
 }
 
 /// A pixel filter.
