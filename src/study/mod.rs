@@ -12,6 +12,7 @@ pub mod measure;
 pub mod report;
 pub mod run;
 pub mod table;
+pub mod truth;
 pub mod width;
 
 pub use flicker::{Flicker, FlickerOptions, flicker};

@@ -5,7 +5,6 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::line::{LineTile, Method, Rules, TileBounds, Window, find_lines};
@@ -215,18 +214,49 @@ fn sampled(
     builder.finish()
 }
 
+/// What was measured.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Drawn {
+    /// By which version of Tusche.
+    pub version: String,
+    /// What was asked for.
+    #[serde(flatten)]
+    pub asked: Asked,
+    /// Drawn width in pixels; see [`drawn`].
+    pub drawn: f64,
+}
+
+impl Drawn {
+    /// Measures.
+    #[must_use]
+    pub fn measure(asked: &Asked) -> Self {
+        // A pixel of edge tells of as many gaps as there are samples along it, so that fewer pixels do for more samples.
+        let length = LENGTH / f64::from(asked.samples).sqrt();
+        Self { version: env!("CARGO_PKG_VERSION").to_owned(), asked: *asked, drawn: drawn(asked, length) }
+    }
+
+    /// Whether it is what would be measured.
+    #[must_use]
+    pub fn is_of(&self, asked: &Asked) -> bool {
+        self.asked == *asked && self.version == env!("CARGO_PKG_VERSION")
+    }
+}
+
+/// How much edge is drawn of one sample per pixel, in pixels.
+const LENGTH: f64 = 2400.0;
+
 /// Rates of samples that are measured.
 pub const SAMPLES: [u32; 5] = [1, 4, 16, 64, 256];
 /// Widths in pixels that are measured.
 pub const WIDTHS: [f32; 5] = [0.5, 1.0, 2.0, 4.0, 8.0];
 
-/// All that the report shows: every edge, sampler, rate and width, by the paper's rule and compensated, in this order.
+/// All that the report shows: every edge, sampler and width, by the paper's rule and compensated, at rising rates.
 #[must_use]
 pub fn all() -> Vec<Asked> {
     let mut all = Vec::new();
-    for edge in Edge::ALL {
-        for sampler in Sampler::ALL {
-            for samples in SAMPLES {
+    for samples in SAMPLES {
+        for edge in Edge::ALL {
+            for sampler in Sampler::ALL {
                 for compensation in [false, true] {
                     all.extend(WIDTHS.map(|width| Asked { edge, sampler, samples, compensation, width }));
                 }

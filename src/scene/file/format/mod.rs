@@ -6,6 +6,7 @@
 //! `x-planned` names values and keys that are designed but not built, each with what to do instead.
 
 mod lines;
+mod truth;
 
 use std::collections::BTreeMap;
 
@@ -13,6 +14,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 pub(super) use self::lines::{Compose, LinePath, Lines, MaterialLines, Threshold};
+pub(super) use self::truth::{Truth, TruthDisc, TruthEdge};
 use crate::scene::check::{MAX_SAMPLES, MAX_SIZE};
 use crate::scene::shape::MAX_SEGMENTS;
 
@@ -39,6 +41,8 @@ pub(super) struct SceneFile {
     pub materials: BTreeMap<String, Material>,
     /// The objects: models and built-in shapes with a place in the world.
     pub objects: Vec<Object>,
+    /// The lines that the picture must show, known by geometry: what `tusche study` measures lines against.
+    pub truth: Option<Truth>,
     /// The lights. Without any, those of the models are used, and failing those, a default set; `lights = []` is dark.
     pub lights: Vec<Light>,
 }
