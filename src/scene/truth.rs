@@ -4,13 +4,11 @@ use std::f64::consts::TAU;
 
 use super::camera::{Camera, Projection};
 use crate::diag::Span;
-use crate::math::{DVec2, DVec3, Vec3};
+use crate::math::{DVec2, DVec3};
 
 /// All lines that a picture must show, and where they were declared.
 #[derive(Clone, Debug)]
 pub struct Truth {
-    /// Their colour, linear.
-    pub color: Vec3,
     /// The lines. Where they cover each other, they are one.
     pub curves: Vec<TruthCurve>,
     /// Where it was declared.

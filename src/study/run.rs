@@ -36,14 +36,23 @@ pub struct StudyOptions {
     pub reference: u32,
     /// The most time to take; points that do not fit are left out, the least telling first.
     pub budget: Option<Duration>,
+    /// Whether to measure how wide lines are drawn, too, if the scene declares lines.
+    pub widths: bool,
     /// Threads; 0 for as many as the machine has.
     pub threads: usize,
 }
 
 impl Default for StudyOptions {
     fn default() -> Self {
-        let knobs = Knob::ALL.to_vec();
-        Self { title: "scene".to_owned(), knobs, repeats: 3, reference: 1024, budget: None, threads: 0 }
+        Self {
+            title: "scene".to_owned(),
+            knobs: Knob::ALL.to_vec(),
+            repeats: 3,
+            reference: 1024,
+            budget: None,
+            widths: true,
+            threads: 0,
+        }
     }
 }
 
@@ -172,7 +181,7 @@ pub fn study(
         }
     }
     // Drawn widths come last.
-    let pictures = if camera.truth.is_some() { 0.9 } else { 1.0 };
+    let pictures = if options.widths && camera.truth.is_some() { 0.9 } else { 1.0 };
     let mut done = f64::from(samples);
     let all = done + waiting.iter().map(|(point, _)| f64::from(ladder.points[*point].samples)).sum::<f64>();
     let (mut left_out, mut complete) = (0, true);
@@ -199,7 +208,8 @@ pub fn study(
         table::write(&folder.table(), &runs)?;
         done += f64::from(settings.samples);
     }
-    let widths = if camera.truth.is_some() && complete {
+    let measures_widths = options.widths && camera.truth.is_some();
+    let widths = if measures_widths && complete {
         let (widths, missing) = drawn_widths(&folder, options.threads, deadline, control)?;
         left_out += missing;
         complete = !control.is_cancelled();
@@ -334,7 +344,8 @@ impl Camera<'_> {
     /// A picture with the seed of a repeat: the scene's own for the first. `None` if it was stopped.
     fn shoot(&self, settings: &Settings, repeat: u32) -> Result<Option<(Shot, Stats)>, Diagnostics> {
         let seed = if repeat == 0 { self.seed } else { self.unused_seed(u64::from(repeat) + 16) };
-        self.take(settings, seed, &[Layer::Rgba, Layer::Line])
+        let planes = self.take(settings, seed, &[Layer::Rgba, Layer::Line])?;
+        Ok(planes.map(|(planes, stats)| (shot(self.size[0] as usize, &planes, None), stats)))
     }
 
     /// The mean of two halves, and its own errors: half of what they differ by. Lines that the scene declares take the place of those
@@ -348,8 +359,12 @@ impl Camera<'_> {
         if self.secondary {
             layers.extend([LinePath::Reflection, LinePath::Refraction].map(Layer::LinePath));
         }
-        let half = |purpose| self.take(&settings, self.unused_seed(purpose), &layers);
-        let (Some((a, _)), Some((b, _))) = (half(1)?, half(2)?) else { return Ok(None) };
+        let half = |purpose| {
+            let planes = self.take(&settings, self.unused_seed(purpose), &layers)?;
+            let declared = self.truth.as_ref().map(|truth| &truth.coverage[..]);
+            Ok::<_, Diagnostics>(planes.map(|(planes, _)| shot(self.size[0] as usize, &planes, declared)))
+        };
+        let (Some(a), Some(b)) = (half(1)?, half(2)?) else { return Ok(None) };
         let own = Reference::new(a.clone(), widest).errors(&b).scaled(0.5);
         let mut shot = Shot::mean(&a, &b);
         let Some(truth) = &self.truth else { return Ok(Some((shot, own))) };
@@ -373,7 +388,8 @@ impl Camera<'_> {
         self.seed ^ (purpose << 40)
     }
 
-    fn take(&self, settings: &Settings, seed: u64, layers: &[Layer]) -> Result<Option<(Shot, Stats)>, Diagnostics> {
+    /// The channels of layers.
+    fn take(&self, settings: &Settings, seed: u64, layers: &[Layer]) -> Result<Option<(Planes, Stats)>, Diagnostics> {
         let mut builder = self.builder.clone();
         settings.apply(&mut builder);
         builder.render.seed = seed;
@@ -403,15 +419,29 @@ impl Camera<'_> {
             return Ok(None);
         }
         let planes = planes.into_inner().unwrap_or_else(PoisonError::into_inner);
-        Ok(Some((shot(width, &planes), report.stats)))
+        Ok(Some((planes, report.stats)))
     }
 }
 
-/// Planes of `rgba`, `line`, and perhaps the lines of two kinds of paths.
-fn shot(width: usize, planes: &[Vec<f32>]) -> Shot {
+/// Channels, each row by row.
+type Planes = Vec<Vec<f32>>;
+
+/// From planes of `rgba`, `line`, and perhaps the lines of two kinds of paths. Where it is declared how much lines cover, colours are
+/// as if they did; the coverage is that of the planes.
+fn shot(width: usize, planes: &[Vec<f32>], declared: Option<&[f32]>) -> Shot {
     let color = |i: usize| {
         let white = 1.0 - planes[3][i];
-        [0, 1, 2].map(|axis| shown(planes[axis][i] + white))
+        let found = [0, 1, 2].map(|axis| planes[axis][i] + white);
+        let alpha = planes[7][i];
+        // What is next to nothing has no colour.
+        let declared = declared.filter(|_| (0.001..=0.999).contains(&alpha)).map(|declared| declared[i]);
+        [0, 1, 2].map(|axis| {
+            let value = declared.map_or(found[axis], |declared| {
+                let [line, below] = [planes[4 + axis][i] / alpha, (found[axis] - planes[4 + axis][i]) / (1.0 - alpha)];
+                line * declared + below * (1.0 - declared)
+            });
+            shown(value)
+        })
     };
     let secondary = |reflection: &Vec<f32>, refraction: &Vec<f32>| {
         reflection.iter().zip(refraction).map(|(a, b)| (a + b).min(1.0)).collect()

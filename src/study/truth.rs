@@ -136,7 +136,7 @@ mod tests {
     use std::f64::consts::PI;
 
     use super::*;
-    use crate::math::{DVec3, Vec3};
+    use crate::math::DVec3;
     use crate::scene::camera::Projection;
     use crate::scene::settings::FilterKind;
     use crate::scene::truth::{TruthCurve, TruthShape};
@@ -146,7 +146,7 @@ mod tests {
     fn covered(curves: Vec<TruthCurve>, filter: &Filter) -> Vec<f64> {
         let view = Projection::Orthographic { height: 2.0 };
         let camera = Camera::look_at("c", view, DVec3::Z, DVec3::ZERO, DVec3::Y).expect("a good camera");
-        let truth = Truth { color: Vec3::ZERO, curves, span: None };
+        let truth = Truth { curves, span: None };
         coverage(&truth, &camera, SIZE, filter).into_iter().map(f64::from).collect()
     }
 

@@ -72,12 +72,15 @@ impl PixelPositions {
 }
 
 /// The factor c of the mean gap between an edge and the nearest sample beyond it (DESIGN section 3.9).
+///
+/// Measured with [`study::width`](crate::study::width) at straight edges of all angles, half widths from 1 px up and 4 to 64 samples:
+/// 0.76 to 0.83 for both Sobol samplers. The same measurement gives 0.79 to 0.82 for `stratified`, whose 0.84 is that of an edge at 13°
+/// and normative.
 #[must_use]
 pub const fn gap_factor(sampler: Sampler) -> f32 {
     match sampler {
         Sampler::Stratified => 0.84,
-        Sampler::Sobol => 0.84,
-        Sampler::BlueNoise => 0.84,
+        Sampler::Sobol | Sampler::BlueNoise => 0.80,
     }
 }
 
@@ -185,6 +188,33 @@ mod tests {
                 }
             }
         }
+    }
+
+    /// What one pixel has too much of, its neighbours have too little of: over blocks of pixels, errors nearly cancel.
+    #[test]
+    fn errors_of_blue_noise_have_little_at_low_frequencies() {
+        let variance = |sampler| {
+            let positions = SamplePositions::new(sampler, 4, 3);
+            let error = |x: i32, y: i32| {
+                let pixel = positions.of_pixel([x, y]);
+                let inside = (0..4).filter(|sample| {
+                    let [x, y] = pixel.offset(*sample);
+                    0.6 * x + 0.35 * y < 0.45
+                });
+                inside.count() as f64 / 4.0
+            };
+            let blocks: Vec<f64> = (0..1024)
+                .map(|block| {
+                    let corner = [block % 32 * 4 + 1, block / 32 * 4 + 2];
+                    (0..16).map(|i| error(corner[0] + i % 4, corner[1] + i / 4)).sum::<f64>() / 16.0
+                })
+                .collect();
+            let mean = blocks.iter().sum::<f64>() / 1024.0;
+            blocks.iter().map(|block| (block - mean) * (block - mean)).sum::<f64>() / 1024.0
+        };
+        let [sobol, blue] = [Sampler::Sobol, Sampler::BlueNoise].map(variance);
+        // The blocks do not lie on the curve's grid: else it would be far less.
+        assert!(blue < 0.6 * sobol, "{blue:e} against {sobol:e}");
     }
 
     #[test]

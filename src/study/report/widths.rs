@@ -96,3 +96,24 @@ fn table(widths: &[Drawn]) -> String {
     }
     html + "</tbody></table></div>\n"
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::study::width::all;
+
+    #[test]
+    fn every_edge_and_sampler_has_a_plot_and_what_is_missing_a_dash() {
+        assert_eq!(section(&[]), "");
+        let drawn = |asked: Asked| Drawn { version: String::new(), drawn: 0.9 * f64::from(asked.width), asked };
+        let mut widths: Vec<_> = all().into_iter().map(drawn).collect();
+        let whole = section(&widths);
+        assert_eq!(whole.matches("<svg class=\"plot\"").count(), Edge::ALL.len() * Sampler::ALL.len());
+        assert_eq!(whole.matches("0.900 <span class=\"soft\">(0.900)</span>").count(), all().len() / 2);
+        // At one sample nothing may be drawn at all.
+        widths[0].drawn = 0.0;
+        widths.truncate(100);
+        let part = section(&widths);
+        assert!(part.contains("– <span") && part.contains("(0.000)") && !part.contains("NaN") && !part.contains("inf"));
+    }
+}

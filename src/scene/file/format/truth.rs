@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::{Color, FAR, TINY};
+use super::{FAR, TINY};
 use crate::scene::check::MAX_LINE_WIDTH;
 
 /// The lines that the picture must show, known by geometry: what `tusche study` measures lines against. A render does not look at it.
@@ -13,8 +13,6 @@ pub(in super::super) struct Truth {
     /// Full width of its lines in pixels. Default: `width` of `[lines]`.
     #[schemars(range(max = MAX_LINE_WIDTH), extend("exclusiveMinimum" = 0))]
     pub width: Option<f64>,
-    /// Their colour. Default: `color` of `[lines]`.
-    pub color: Option<Color>,
     /// Lines along straight edges. Where lines cross, they are one.
     #[serde(default)]
     pub edges: Vec<TruthEdge>,

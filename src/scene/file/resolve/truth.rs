@@ -2,7 +2,7 @@
 
 use super::super::document::Node;
 use super::super::format;
-use super::{Resolver, rgb, unknown_name};
+use super::{Resolver, unknown_name};
 use crate::diag::{Diagnostic, Span};
 use crate::math::{DVec2, DVec3};
 use crate::scene::shape::Shape;
@@ -24,11 +24,10 @@ impl Resolver<'_> {
             curves.extend(shape.and_then(|shape| self.truth_curve(shape, edge.width.unwrap_or(width), node)));
         }
         for (disc, node) in truth.discs.iter().zip(node.get("discs").map_or(&[][..], Node::items)) {
-            let shape = self.truth_disc(disc, node);
+            let shape = self.truth_disc(disc, node, file);
             curves.extend(shape.and_then(|shape| self.truth_curve(shape, disc.width.unwrap_or(width), node)));
         }
-        let color = rgb(truth.color.unwrap_or(file.lines.color));
-        self.scene.truth = Some(Truth { color, curves, span: Some(node.span.clone()) });
+        self.scene.truth = Some(Truth { curves, span: Some(node.span.clone()) });
     }
 
     fn truth_edge(&mut self, edge: &format::TruthEdge, node: &Node) -> Option<TruthShape> {
@@ -49,10 +48,15 @@ impl Resolver<'_> {
         None
     }
 
-    fn truth_disc(&mut self, disc: &format::TruthDisc, node: &Node) -> Option<TruthShape> {
+    fn truth_disc(
+        &mut self,
+        disc: &format::TruthDisc,
+        node: &Node,
+        file: &format::SceneFile,
+    ) -> Option<TruthShape> {
         match (&disc.object, disc.center, disc.radius) {
             (Some(name), None, None) if !node.mentions("center") && !node.mentions("radius") => {
-                self.truth_object(name, node.span_of("object"))
+                self.truth_object(name, node.span_of("object"), file)
             }
             (None, Some(center), Some(radius)) if !node.mentions("object") => {
                 Some(TruthShape::FilmCircle { center: center.into(), radius })
@@ -79,12 +83,12 @@ impl Resolver<'_> {
     }
 
     /// The outline of a named object.
-    fn truth_object(&mut self, name: &str, span: Span) -> Option<TruthShape> {
+    fn truth_object(&mut self, name: &str, span: Span, file: &format::SceneFile) -> Option<TruthShape> {
         let Some(object) = self.scene.objects.iter().find(|object| object.name == name) else {
             let names: Vec<_> = self.scene.objects.iter().map(|object| object.name.as_str()).collect();
             let fault = unknown_name("object", name, names.into_iter());
             // One that is at fault itself is not there either, and that is told.
-            if !self.faults.has_errors() {
+            if !file.objects.iter().any(|object| object.name.as_deref() == Some(name)) {
                 self.faults.push(fault.at(span));
             }
             return None;
