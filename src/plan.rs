@@ -8,7 +8,9 @@ use crate::film::{Filter, Layer};
 use crate::line::{LineScript, Rules};
 use crate::sample::{NodeColumnSet, SampleLayout};
 use crate::scene::ids::MaterialId;
-use crate::scene::settings::{Background, FilterKind, LineOverrides, LineSettings, LineType, RayKinds, RenderSettings, Sampler};
+use crate::scene::settings::{
+    Background, FilterKind, LineOverrides, LineSettings, LineType, RayKinds, RenderSettings, Sampler,
+};
 use crate::scene::{Object, Scene};
 use crate::shade::analysis::OutputFact;
 use crate::shade::bsdf::MIRROR_ROUGHNESS;

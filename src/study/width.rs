@@ -10,7 +10,9 @@ use serde::{Deserialize, Serialize};
 use crate::line::{LineTile, Method, Rules, TileBounds, Window, find_lines};
 use crate::math::portable;
 use crate::sample::position::SamplePositions;
-use crate::sample::{Node, NodeColumnSet, NodePath, PixelRect, SampleBuffer, SampleBufferBuilder, SampleColor, SampleLayout};
+use crate::sample::{
+    Node, NodeColumnSet, NodePath, PixelRect, SampleBuffer, SampleBufferBuilder, SampleColor, SampleLayout,
+};
 use crate::scene::settings::{LineSettings, Sampler};
 
 /// An edge whose line has a known area. The shape lies before nothing; its material draws the line.

@@ -213,7 +213,7 @@ fn what_cannot_be_studied_is_told() {
     place.run(&["study", "scene.toml"]).exits(2).says("-o DIR");
     place.run(&["study", "scene.toml", "-o", "a", "-o", "b"]).exits(2).says("one folder");
     place.run(&["study", "scene.toml", "-o", "a", "--lines", "bauer"]).exits(2).says("leave out");
-    place.run(&["study", "scene.toml", "-o", "a", "--knob", "sample"]).exits(2).says("did you mean `samples`?");
+    place.run(&["study", "scene.toml", "-o", "a", "--knob", "sampls"]).exits(2).says("did you mean `samples`?");
     place.run(&["study", "scene.toml", "-o", "a", "--budget", "5"]).exits(2).says("write it with a unit");
     place.run(&["study", "scene.toml", "-o", "a", "--budget", "-5m"]).exits(2);
     place.run(&["study", "scene.toml", "-o", "a", "--budget", "nans"]).exits(2).says("is not a time above 0");

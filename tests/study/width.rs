@@ -14,7 +14,10 @@ fn compensated_lines_are_as_wide_as_asked_whichever_the_edge_and_the_sampler() {
         for sampler in Sampler::ALL {
             for (samples, width, tolerance) in [(4, 2.0, 0.035), (16, 1.0, 0.035), (16, 4.0, 0.015), (64, 2.0, 0.01)] {
                 let share = share(edge, sampler, samples, true, width);
-                assert!((share - 1.0).abs() < tolerance, "{edge:?}, {sampler:?}, {samples} samples, {width} px: {share}");
+                assert!(
+                    (share - 1.0).abs() < tolerance,
+                    "{edge:?}, {sampler:?}, {samples} samples, {width} px: {share}"
+                );
             }
         }
     }
@@ -27,7 +30,10 @@ fn the_papers_rule_draws_as_thin_as_predicted() {
             let share = share(Edge::Straight, sampler, samples, false, width);
             let gap = 0.80 * (3.0 / (4.0 * f64::from(width).sqrt() * f64::from(samples))).powf(2.0 / 3.0);
             let predicted = 1.0 - 2.0 * gap / f64::from(width);
-            assert!((share - predicted).abs() < 0.1 * (1.0 - predicted), "{sampler:?}, {samples}: {share} for {predicted}");
+            assert!(
+                (share - predicted).abs() < 0.1 * (1.0 - predicted),
+                "{sampler:?}, {samples}: {share} for {predicted}"
+            );
         }
     }
 }

@@ -189,9 +189,10 @@ fn samplers(study: &Study, summary: &Summary) -> String {
     if points.is_empty() {
         return String::new();
     }
-    let mut html = "<h2>Samplers</h2>\n<p>The same errors by how samples are spread over the pixels, against samples per pixel. \
+    let mut html =
+        "<h2>Samplers</h2>\n<p>The same errors by how samples are spread over the pixels, against samples per pixel. \
                     Dashed: the ideal N<sup>−0.75</sup>.</p>\n<ul class=\"legend\">"
-        .to_owned();
+            .to_owned();
     for (kind, sampler) in Sampler::ALL.into_iter().enumerate() {
         let path = shape(kind);
         let _ = write!(

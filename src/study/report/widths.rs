@@ -74,9 +74,10 @@ fn plot(widths: &[Drawn], edge: Edge, sampler: Sampler) -> Plot<'static> {
 }
 
 fn table(widths: &[Drawn]) -> String {
-    let mut html = "<h3>Drawn / asked, compensated (paper's rule)</h3>\n<div class=\"wide\"><table>\n<thead><tr><th>edge</th>\
+    let mut html =
+        "<h3>Drawn / asked, compensated (paper's rule)</h3>\n<div class=\"wide\"><table>\n<thead><tr><th>edge</th>\
                     <th>sampler</th><th>samples</th>"
-        .to_owned();
+            .to_owned();
     WIDTHS.iter().for_each(|width| html += &format!("<th>{width} px</th>"));
     html.push_str("</tr></thead>\n<tbody>\n");
     for edge in Edge::ALL {

@@ -48,12 +48,7 @@ impl Resolver<'_> {
         None
     }
 
-    fn truth_disc(
-        &mut self,
-        disc: &format::TruthDisc,
-        node: &Node,
-        file: &format::SceneFile,
-    ) -> Option<TruthShape> {
+    fn truth_disc(&mut self, disc: &format::TruthDisc, node: &Node, file: &format::SceneFile) -> Option<TruthShape> {
         match (&disc.object, disc.center, disc.radius) {
             (Some(name), None, None) if !node.mentions("center") && !node.mentions("radius") => {
                 self.truth_object(name, node.span_of("object"), file)
@@ -99,9 +94,10 @@ impl Resolver<'_> {
         let is_even = |axes: &[DVec3]| {
             let length = axes[0].length();
             let longest = axes.iter().map(|axis| axis.length()).fold(0.0, f64::max);
-            let skewed = axes.iter().enumerate().any(|(i, a)| {
-                axes[..i].iter().any(|b| a.dot(*b).abs() > 1e-9 * longest * longest)
-            });
+            let skewed = axes
+                .iter()
+                .enumerate()
+                .any(|(i, a)| axes[..i].iter().any(|b| a.dot(*b).abs() > 1e-9 * longest * longest));
             !skewed && axes.iter().all(|axis| (axis.length() - length).abs() <= 1e-9 * longest)
         };
         match shape {
