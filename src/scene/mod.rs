@@ -14,6 +14,7 @@ pub mod light;
 mod lookup;
 pub mod material;
 pub mod mesh;
+pub mod mesh_file;
 pub mod script_files;
 pub mod settings;
 pub mod shape;

@@ -374,12 +374,13 @@ pub(super) enum TextureFilter {
 /// A model or a built-in shape with a place in the world.
 #[derive(Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-#[schemars(extend("x-planned" = { "mesh": "convert the model to glTF, and use `gltf = \"model.glb\"`" }))]
 pub(super) struct Object {
     /// Its name, for messages and `--set objects.NAME.…`. Default: the name of the model or shape.
     pub name: Option<String>,
     /// Path of a glTF model: `.gltf` or `.glb`.
     pub gltf: Option<String>,
+    /// Path of a mesh: `.obj` or `.ply`. Of it only the shape is used; `material` says what it looks like.
+    pub mesh: Option<String>,
     /// A built-in shape, instead of a model. By default each is centred and fits the cube from -1 to 1; y is its axis.
     pub shape: Option<Shape>,
     /// Edge lengths of a box (x, y, z) or a plane (x, z); one number for all. Default: 2.
