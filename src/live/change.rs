@@ -154,7 +154,7 @@ fn same_ties(old: &Scene, new: &Scene) -> bool {
 /// Whether the camera's rays start alike.
 fn same_sampling(old: &Scene, new: &Scene) -> bool {
     let (a, b) = (old.render(), new.render());
-    a.size == b.size && a.samples == b.samples && a.seed == b.seed
+    a.size == b.size && a.samples == b.samples && a.sampler == b.sampler && a.seed == b.seed
 }
 
 /// Whether the tests of the line pass are the same, for every material.

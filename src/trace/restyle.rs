@@ -117,7 +117,7 @@ impl TileTracer<'_> {
                 }
                 None => {
                     let pixel = samples.pixel_of(sample);
-                    let offset = self.positions.offset(pixel, sample % samples.samples_per_pixel);
+                    let offset = self.positions.of_pixel(pixel).offset(sample % samples.samples_per_pixel);
                     self.rays.ray(pixel, offset)
                 }
             };

@@ -150,7 +150,7 @@ impl<'a> TileTracer<'a> {
             plan,
             world,
             lighting,
-            positions: SamplePositions::new(settings.samples, settings.seed),
+            positions: SamplePositions::new(settings.sampler, settings.samples, settings.seed),
             rays: scene.camera().rays(settings.size),
             transparent: settings.background == Background::Transparent,
             stand_ins: scene.stand_ins(),
@@ -242,7 +242,8 @@ impl<'a> TileTracer<'a> {
         let width = rect.width() as usize;
         pixels.flat_map(move |index| {
             let pixel = [rect.x0 + (index % width) as i32, rect.y0 + (index / width) as i32];
-            let place = move |sample| (index as u32 * per_pixel + sample, pixel, self.positions.offset(pixel, sample));
+            let positions = self.positions.of_pixel(pixel);
+            let place = move |sample| (index as u32 * per_pixel + sample, pixel, positions.offset(sample));
             (0..per_pixel).map(place)
         })
     }

@@ -9,6 +9,7 @@ mod material;
 mod object;
 mod settings;
 mod transform;
+mod truth;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -67,6 +68,7 @@ pub(super) fn resolve(file: &SceneFile, node: &Node, context: Context<'_>, fault
     resolver.lights(&file.lights, model_lights);
     resolver.cameras(file);
     resolver.fill_in();
+    resolver.truth(file);
     resolver.scene
 }
 
