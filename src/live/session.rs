@@ -291,13 +291,15 @@ impl Shared {
 
     /// Renders all pictures of a setup, until the final one or until a newer setup has come.
     fn show(&self, setup: &Arc<Setup>, generation: u64, kept: &mut Kept) -> Result<(), Diagnostics> {
-        let last = setup.scene.render().samples;
-        let mut samples = if self.options.progressive { 1 } else { last };
+        let RenderSettings { samples: last, size, .. } = *setup.scene.render();
+        let mut samples = last;
         if let Some(stages) = &mut kept.stages {
             let prepared = Prepared::new(setup, stages.samples(), Some(stages.prepared()))?;
             let redo = stages.redo_for(&prepared);
             if !redo.trace && (stages.samples() == last || (self.options.progressive && stages.samples() < last)) {
-                let slow = stages.seconds_to_shade(&redo) > PATIENCE;
+                let seconds = stages.seconds_for(&redo);
+                // A picture of one sample is traced from scratch; it must come much sooner to be worth that.
+                let slow = seconds > PATIENCE && stages.seconds_at(1, size) < seconds / 3.0;
                 stages.set(prepared, &redo);
                 if slow && self.options.progressive && stages.samples() > 1 {
                     let preview = Prepared::new(setup, 1, Some(stages.prepared()))?;
@@ -312,8 +314,12 @@ impl Shared {
                 if !is_done || stages.samples() == last {
                     return Ok(());
                 }
-                samples = (stages.samples() * 2).min(last);
+                samples = next_rung(stages, last, size);
+            } else if self.options.progressive && stages.seconds_at(last, size) > AT_ONCE {
+                samples = 1;
             }
+        } else if self.options.progressive {
+            samples = 1;
         }
         loop {
             let prepared = Prepared::new(setup, samples, kept.stages.as_ref().map(Stages::prepared))?;
@@ -334,7 +340,7 @@ impl Shared {
             if !is_done || samples == last {
                 return Ok(());
             }
-            samples = (samples * 2).min(last);
+            samples = kept.stages.as_ref().map_or((samples * 2).min(last), |stages| next_rung(stages, last, size));
         }
     }
 
@@ -420,6 +426,20 @@ impl Shared {
 
 /// Longer than this, in seconds, nobody should wait for a picture: one of fewer samples comes first.
 const PATIENCE: f64 = 0.3;
+/// A picture that takes fewer seconds than this is made at once, even if all is to be traced.
+const AT_ONCE: f64 = 0.15;
+/// In so many seconds the next picture of more samples should come, if it can be done with twice as many or more.
+const NEXT_WITHIN: f64 = 1.0;
+
+/// How many samples per pixel come after those of a picture that is up to date: at least twice as many, and as many as
+/// can be had soon.
+fn next_rung(stages: &Stages, last: u32, size: [u32; 2]) -> u32 {
+    let mut samples = stages.samples().saturating_mul(2);
+    while samples < last && stages.seconds_at(samples.saturating_mul(2).min(last), size) <= NEXT_WITHIN {
+        samples = samples.saturating_mul(2);
+    }
+    samples.min(last)
+}
 
 /// About what a sample takes in memory with and without what its rays met, before anything was measured.
 const BYTES_PER_SAMPLE: [u64; 2] = [160, 90];

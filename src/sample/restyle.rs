@@ -1,34 +1,48 @@
 //! New line and feature attributes for nodes that are there already.
 
-use super::buffer::{Column, Node, SampleBuffer};
+use super::buffer::{Column, Node, NodeColumnSet, SampleBuffer};
 use super::builder::SampleLayout;
 use super::gate::clean_node;
 
 impl SampleBuffer {
     /// Replaces what the line pass alone reads (feature and line attributes, priority) at some rows, rising, of the path
-    /// of this number. The columns are then what they would be had the nodes come like this. Returns whether anything
-    /// differs, or `None` if the gate had to stop something, which it would have to count.
-    pub(crate) fn restyle(&mut self, path: usize, rows: &[u32], nodes: &[Node], layout: &SampleLayout) -> Option<bool> {
-        let kept = layout.columns;
-        let mut clean = Vec::with_capacity(nodes.len());
-        for node in nodes {
-            let (node, faults) = clean_node(*node, kept, layout.max_width_of(node.shader));
+    /// of this number and a place in its lists, 0 for the first surfaces. The new ones are those of `styles`, by row or
+    /// as `style_of` says. The columns are then what they would be had the nodes come like this. Returns whether
+    /// anything differs, or `None` if the gate had to stop something, which it would have to count.
+    pub(crate) fn restyle(
+        &mut self,
+        (path, place): (usize, usize),
+        rows: &[u32],
+        (styles, style_of): (&[Node], Option<&[u32]>),
+        layout: &SampleLayout,
+    ) -> Option<bool> {
+        let NodeColumnSet { feature, lines, .. } = layout.columns;
+        // All else of the nodes has passed the gate before.
+        let kept = NodeColumnSet { feature, lines, ..NodeColumnSet::default() };
+        let mut clean = Vec::with_capacity(styles.len());
+        for style in styles {
+            let (style, faults) = clean_node(Node { depth: 0.0, ..*style }, kept, layout.max_width_of(style.shader));
             if !faults.is_empty() {
                 return None;
             }
-            clean.push(node);
+            clean.push(style);
         }
         let columns = self.paths.get_mut(path)?;
+        let columns = match place {
+            0 => columns,
+            _ => columns.behind.get_mut(place - 1)?,
+        };
         let len = columns.rows.len();
+        let new = (0..rows.len()).map(|index| &clean[style_of.map_or(index, |style_of| style_of[index] as usize)]);
         let mut changed = false;
-        if kept.feature {
-            changed |= replace(&mut columns.feature, len, rows, clean.iter().map(|node| node.feature));
+        if feature {
+            changed |= replace(&mut columns.feature, len, rows, new.clone().map(|node| node.feature));
         }
-        if kept.lines {
-            changed |= replace(&mut columns.line_color, len, rows, clean.iter().map(|node| node.line_color));
-            changed |= replace(&mut columns.line_width, len, rows, clean.iter().map(|node| node.line_width));
-            changed |= replace(&mut columns.line_opacity, len, rows, clean.iter().map(|node| node.line_opacity));
-            changed |= replace(&mut columns.priority, len, rows, clean.iter().map(|node| node.priority));
+        if lines {
+            changed |= replace(&mut columns.line_color, len, rows, new.clone().map(|node| node.line_color));
+            changed |= replace(&mut columns.line_width, len, rows, new.clone().map(|node| node.line_width));
+            changed |= replace(&mut columns.line_opacity, len, rows, new.clone().map(|node| node.line_opacity));
+            changed |= replace(&mut columns.priority, len, rows, new.map(|node| node.priority));
         }
         Some(changed)
     }

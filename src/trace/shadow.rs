@@ -32,7 +32,8 @@ impl TileTracer<'_> {
         for hit in group {
             let surface = &hit.surface;
             let known = match work.known {
-                Some(known) if hit.place == 0 => known.visibility(&nodes[hit.ray.node as usize], &hit.ray, &hit.hit),
+                // Shadow rays start farther off where bodies touch, which depends on shaders.
+                Some(known) if hit.place == 0 && self.plan.bodies.is_empty() => known.visibility(&nodes[hit.ray.node as usize], &hit.ray, &hit.hit),
                 _ => &[],
             };
             for light in 0..self.lighting.len() {

@@ -204,7 +204,7 @@ impl<'a> TileTracer<'a> {
             self.run_wave(wave, &mut run, context, work);
         }
         run.gather_radiance();
-        run.surfaces.sort_by_key(|&(node, place, _)| (place, node));
+        run.surfaces.sort_by_key(|&(node, place, ..)| (place, node));
         self.store(&run, &offsets, samples);
         if let Some(record) = record {
             record.add(&run);
@@ -266,11 +266,16 @@ impl<'a> TileTracer<'a> {
             let node = &mut nodes[wave_ray.node as usize];
             let ray = Ray::new(wave_ray.origin, wave_ray.direction);
             let mut from = *wave_ray;
-            let known = self.known_hit(work, node, wave_ray);
+            let known = self.known_hit(work, node, wave_ray, &mut list);
+            let mut is_known = known.is_some();
             let mut at_once = known.or(packet[index % LANES]);
+            // Whether what is seen is what was met first, so that a record of it serves the same ray again.
+            let mut met_first = true;
             let seen = loop {
-                let kind = if known.is_some() { RayKinds::empty() } else { work.count(node.kind) };
-                list.clear();
+                let kind = if is_known { seen_as(node.kind) } else { work.count(node.kind) };
+                if !std::mem::take(&mut is_known) {
+                    list.clear();
+                }
                 let found = if let Some(found) = at_once.take() {
                     found
                 } else if from.passed >= MOST_INVISIBLE {
@@ -286,10 +291,11 @@ impl<'a> TileTracer<'a> {
                     break Some(Seen { hit: found, error: Vec3::ZERO, crossing: None });
                 }
                 if let Some(seen) = self.cross(&ray, kind, &mut from, &found, media) {
+                    met_first = seen.hit == found;
                     break Some(seen);
                 }
             };
-            record.note(&from, seen.as_ref().map(|seen| &seen.hit));
+            record.note(&from, seen.as_ref().map(|seen| &seen.hit), met_first);
             let Some(Seen { hit, error, crossing }) = seen else {
                 node.radiance = self.lighting.background(from.direction);
                 node.alpha = if self.transparent { 0.0 } else { 1.0 };
@@ -310,10 +316,27 @@ impl<'a> TileTracer<'a> {
         hits
     }
 
-    /// What a ray meets, if a record tells. Lists want more than that, and what is seen of bodies depends on their shaders.
-    fn known_hit(&self, work: &Work<'_>, node: &TreeNode, ray: &WaveRay) -> Option<Option<Hit>> {
-        let known = work.known.filter(|_| self.plan.bodies.is_empty() && !self.keeps_list(node.path))?;
-        known.met(node, ray)
+    /// What a ray meets, if a record tells, with its list of surfaces. Which surfaces a list holds is known only where
+    /// none can be invisible.
+    fn known_hit(
+        &self,
+        work: &Work<'_>,
+        node: &TreeNode,
+        ray: &WaveRay,
+        list: &mut Vec<Hit>,
+    ) -> Option<Option<Hit>> {
+        let known = work.known?;
+        list.clear();
+        if !self.keeps_list(node.path) {
+            return known.met(node, ray);
+        }
+        if !self.plan.lists_are_opaque() {
+            return None;
+        }
+        let first = known.met(node, ray)?;
+        list.extend(first);
+        list.extend(known.behind(node.path, node.sample));
+        Some(first)
     }
 
     /// What camera rays meet that start together; `None` for rays that are to be traced one by one: those of mirrors and glass
@@ -366,7 +389,7 @@ impl<'a> TileTracer<'a> {
             attributes.contribution = (Vec3::from(attributes.throughput) * node.radiance).to_array();
             samples.push(node.path, node.sample, attributes);
         }
-        for &(node, place, attributes) in &run.surfaces {
+        for &(node, place, _, attributes) in &run.surfaces {
             let node = &run.nodes[node as usize];
             samples.push_behind(node.path, place as usize, node.sample, attributes);
         }
@@ -397,13 +420,22 @@ impl Work<'_> {
 
     /// Counts a ray towards a node; returns what objects see it as.
     pub fn count(&mut self, kind: PathKind) -> RayKinds {
-        let (count, kind) = match kind {
-            PathKind::Camera | PathKind::Shadow => (&mut self.rays.camera, RayKinds::CAMERA),
-            PathKind::Reflection => (&mut self.rays.reflection, RayKinds::REFLECTION),
-            PathKind::Refraction => (&mut self.rays.refraction, RayKinds::REFRACTION),
+        let count = match kind {
+            PathKind::Camera | PathKind::Shadow => &mut self.rays.camera,
+            PathKind::Reflection => &mut self.rays.reflection,
+            PathKind::Refraction => &mut self.rays.refraction,
         };
         *count += 1;
-        kind
+        seen_as(kind)
+    }
+}
+
+/// What objects see a ray towards a node as.
+fn seen_as(kind: PathKind) -> RayKinds {
+    match kind {
+        PathKind::Camera | PathKind::Shadow => RayKinds::CAMERA,
+        PathKind::Reflection => RayKinds::REFLECTION,
+        PathKind::Refraction => RayKinds::REFRACTION,
     }
 }
 

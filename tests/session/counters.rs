@@ -106,6 +106,17 @@ fn a_line_setting_runs_the_line_pass_and_the_film_alone() {
 }
 
 #[test]
+fn tint_runs_the_line_pass_and_the_film_alone() {
+    let mut desk = Desk::new();
+    for (old, new) in [("normal = 40.0", "normal = 40.0\ntint = false"), ("tint = false", "tint = true")] {
+        let tinted = desk.replace(old, new);
+        let redone = &tinted.redone;
+        assert_eq!((rays(&tinted), redone.shaded, redone.restyled), (0, 0, 0), "{redone:?}");
+        assert!(redone.lined == redone.tiles && redone.developed > 0, "{redone:?}");
+    }
+}
+
+#[test]
 fn the_line_width_of_a_script_runs_its_line_slice_alone() {
     let mut desk = Desk::new();
     let wider = desk.replace("line_width: p.ink * hit.uv.x", "line_width: p.ink * hit.uv.y");
@@ -194,7 +205,10 @@ fn subscribers_hear_complete_pictures_with_ever_more_samples() {
         _ => None,
     });
     let shown: Vec<_> = shown.collect();
-    assert_eq!(shown, [(generation, 1, false), (generation, 2, false), (generation, 4, false), (generation, 5, true)]);
+    assert_eq!(shown.first(), Some(&(generation, 1, false)));
+    assert_eq!(shown.last(), Some(&(generation, 5, true)));
+    // At least twice as many each time; how many more depends on how fast the machine is.
+    assert!(shown.windows(2).all(|two| two[1].1 >= (2 * two[0].1).min(5)), "{shown:?}");
 }
 
 #[test]
