@@ -225,6 +225,11 @@ impl Stages {
         self.prepared.scene.render().samples
     }
 
+    /// Whether what rays met is kept.
+    pub fn keeps_records(&self) -> bool {
+        self.keeps_records
+    }
+
     pub fn channels(&self) -> &[Vec<f32>] {
         &self.channels
     }
