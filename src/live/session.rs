@@ -1,7 +1,7 @@
 //! A session: one thread that always works on the newest setup, and tells its subscribers what comes of it.
 
 use std::fmt;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
@@ -282,6 +282,14 @@ impl Shared {
         self.lock().subscribers.retain(|subscriber| subscriber.send(event.clone()).is_ok());
     }
 
+    /// Tells of progress if that is worth the waking of those who listen: `steps` are those that were told.
+    fn tell_progress(&self, steps: &AtomicU32, generation: u64, samples: u32, share: f64) {
+        let step = (share * PROGRESS_STEPS) as u32;
+        if steps.fetch_max(step, Ordering::Relaxed) < step {
+            self.tell(&Event::Progress { generation, samples, share });
+        }
+    }
+
     /// The worker's life.
     fn work(&self) {
         let pool = match rayon::ThreadPoolBuilder::new().num_threads(self.options.threads).build() {
@@ -409,7 +417,8 @@ impl Shared {
         shows_all: bool,
     ) -> bool {
         let samples = stages.samples();
-        let progress = |share: f64| self.tell(&Event::Progress { generation, samples, share });
+        let steps = AtomicU32::new(0);
+        let progress = |share: f64| self.tell_progress(&steps, generation, samples, share);
         let control = Control { cancel: Some(&self.cancel), progress: Some(&progress) };
         let Some(Outcome { report, redone, changed }) = stages.work(&control) else { return false };
         let scene = &stages.prepared().scene;
@@ -451,7 +460,8 @@ impl Shared {
         let whole = PixelRect::of_size(size);
         let counts: usize = plan.layers.iter().map(|layer| layer.channels().len()).sum();
         let channels = Mutex::new(vec![vec![0.0; whole.pixels()]; counts]);
-        let progress = |share: f64| self.tell(&Event::Progress { generation, samples, share });
+        let steps = AtomicU32::new(0);
+        let progress = |share: f64| self.tell_progress(&steps, generation, samples, share);
         let control = Control { cancel: Some(&self.cancel), progress: Some(&progress) };
         let options = RenderOptions { threads: self.options.threads, tile: self.options.tile, ..Default::default() };
         let put = |tile: &FilmTile| {
@@ -484,6 +494,8 @@ impl Shared {
 
 /// Longer than this, in seconds, nobody should wait for a picture: one of fewer samples comes first.
 const PATIENCE: f64 = 0.3;
+/// In how many steps the progress of a picture is told.
+const PROGRESS_STEPS: f64 = 64.0;
 /// A picture that takes fewer seconds than this is made at once, even if all is to be traced.
 const AT_ONCE: f64 = 0.15;
 /// In so many seconds the next picture of more samples should come, if it can be done with twice as many or more.

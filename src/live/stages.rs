@@ -130,6 +130,8 @@ const CAMERA_RECORD_BYTES: u64 = 24;
 struct Sampled {
     /// Whether lines may look otherwise.
     changed: bool,
+    /// Whether the tile's own lines may, and no others.
+    own_lines_changed: bool,
     /// Whether pixels may, even with the same lines.
     pixels_changed: bool,
     traced: bool,
@@ -344,6 +346,7 @@ impl Stages {
             totals.seconds.lines += sampled.line_seconds;
             totals.hits.iter_mut().zip(&sampled.hits).for_each(|(total, hits)| *total += hits);
             totals.shade_seconds.iter_mut().zip(&sampled.shade_seconds).for_each(|(total, own)| *total += own);
+            self.tiles[*index].lines_due |= sampled.own_lines_changed;
             if sampled.changed {
                 for near in self.grid.around(*index, self.reach[0]).tiles {
                     self.tiles[near].lines_due = true;
@@ -543,19 +546,24 @@ fn bring_up_to_date(
             record
         });
         contexts.with(|context| {
-            let memory = Memory { known: known.as_ref(), keep: keeps_record };
+            let memory = Memory::new(known.as_ref(), keeps_record);
             let traced = tracer.trace_with(rect, context, memory);
             tile.errors = std::mem::take(&mut context.errors);
-            sampled.changed = tile.samples.as_deref() != Some(&traced.samples);
-            sampled.pixels_changed = sampled.changed;
-            sampled.traced = known.is_none();
-            sampled.shaded = known.is_some();
+            let (new, old) = (&traced.samples, tile.samples.as_deref());
+            let lit_lines = prepared.plan.lines.as_ref().is_some_and(|lines| lines.rules.read_light());
+            sampled.pixels_changed = old != Some(new);
+            sampled.changed = sampled.pixels_changed
+                && old.is_none_or(|old| (lit_lines && old.paths != new.paths) || !old.same_nodes(new));
+            // Lines that let the sample's colour through have it mixed in.
+            let covered = || tile.lines.as_ref().is_none_or(|lines| lines.lines.iter().all(|line| line.covers));
+            sampled.own_lines_changed = old.is_none_or(|old| !old.same_colors(new)) && !covered();
+            (sampled.traced, sampled.shaded) = (known.is_none(), known.is_some());
             sampled.rays += traced.rays;
             sampled.seconds += traced.seconds;
             sampled.shade_seconds = traced.shade_seconds;
             sampled.hits.clone_from(&traced.hits);
             tile.hits = traced.hits;
-            tile.record = traced.record;
+            tile.record = traced.record.or(known.filter(|_| keeps_record));
             tile.samples = Some(Box::new(traced.samples));
         });
     }

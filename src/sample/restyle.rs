@@ -1,6 +1,6 @@
-//! New line and feature attributes for nodes that are there already.
+//! New line and feature attributes for nodes that are there already, and what of samples a change of light leaves alone.
 
-use super::buffer::{Column, Node, NodeColumnSet, SampleBuffer};
+use super::buffer::{Column, Node, NodeColumnSet, NodeColumns, SampleBuffer};
 use super::builder::SampleLayout;
 use super::gate::clean_node;
 
@@ -46,6 +46,62 @@ impl SampleBuffer {
         }
         Some(changed)
     }
+}
+
+impl SampleBuffer {
+    /// Whether the nodes are those of another buffer of the same rectangle, but for how much light they pass on.
+    pub(crate) fn same_nodes(&self, other: &Self) -> bool {
+        same_nodes(&self.paths, &other.paths)
+    }
+
+    /// Whether the samples look alike before lines.
+    pub(crate) fn same_colors(&self, other: &Self) -> bool {
+        self.color == other.color && self.alpha == other.alpha
+    }
+}
+
+fn same_nodes(all: &[NodeColumns], others: &[NodeColumns]) -> bool {
+    let same = |(a, b): (&NodeColumns, &NodeColumns)| {
+        let NodeColumns {
+            path,
+            rows,
+            object,
+            member,
+            shader,
+            uv,
+            normal,
+            feature,
+            depth,
+            line_color,
+            line_width,
+            line_opacity,
+            priority,
+            position,
+            geometric_normal,
+            footprint,
+            throughput: _,
+            contribution: _,
+            behind,
+        } = a;
+        *path == b.path
+            && *rows == b.rows
+            && *object == b.object
+            && *member == b.member
+            && *shader == b.shader
+            && *uv == b.uv
+            && *normal == b.normal
+            && *feature == b.feature
+            && *depth == b.depth
+            && *line_color == b.line_color
+            && *line_width == b.line_width
+            && *line_opacity == b.line_opacity
+            && *priority == b.priority
+            && *position == b.position
+            && *geometric_normal == b.geometric_normal
+            && *footprint == b.footprint
+            && same_nodes(behind, &b.behind)
+    };
+    all.len() == others.len() && all.iter().zip(others).all(same)
 }
 
 /// Replaces values of a column at some rows; whether any differs.

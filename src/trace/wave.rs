@@ -67,7 +67,7 @@ impl std::ops::AddAssign for RayCounts {
 pub struct TracedTile {
     /// The samples.
     pub samples: SampleBuffer,
-    /// What the rays met, if it was to be kept.
+    /// What the rays met, if it was to be kept and was not all known.
     pub record: Option<TileRecord>,
     /// Rays traced.
     pub rays: RayCounts,
@@ -165,6 +165,19 @@ impl<'a> TileTracer<'a> {
 
     /// The same with a memory: what is known of the rays is not traced again.
     pub fn trace_with(&self, rect: PixelRect, context: &mut TraceContext<'_>, memory: Memory<'_>) -> TracedTile {
+        if memory.known.is_some() && memory.keep {
+            // A record that answers every ray need not be made again.
+            let errors = context.errors.clone();
+            let traced = self.trace_tile(rect, context, Memory { keep: false, only_known: true, ..memory });
+            if traced.rays == RayCounts::default() {
+                return traced;
+            }
+            context.errors = errors;
+        }
+        self.trace_tile(rect, context, memory)
+    }
+
+    fn trace_tile(&self, rect: PixelRect, context: &mut TraceContext<'_>, memory: Memory<'_>) -> TracedTile {
         let clock = CpuClock::thread();
         let mut work = Work { known: memory.known, ..Work::new(self.scene.materials().len()) };
         let mut record = memory.keep.then(|| TileRecord::new(self.lighting.len()));
@@ -176,6 +189,9 @@ impl<'a> TileTracer<'a> {
         while first < rect.pixels() {
             let run = first..(first + run_pixels).min(rect.pixels());
             self.trace_run(rect, run.clone(), (&mut samples, &mut record), context, &mut work);
+            if memory.only_known && work.rays != RayCounts::default() {
+                break;
+            }
             first = run.end;
         }
         let samples = samples.finish();
@@ -401,8 +417,18 @@ impl<'a> TileTracer<'a> {
 pub struct Memory<'a> {
     /// The record of an earlier picture of the same objects, camera and sample positions.
     pub known: Option<&'a TileRecord>,
-    /// Whether to keep a record.
+    /// Whether to keep a record. If all was known, there is none: the known one serves on.
     pub keep: bool,
+    /// Whether to give up where a ray must be traced.
+    only_known: bool,
+}
+
+impl<'a> Memory<'a> {
+    /// A memory of what is known, if anything is.
+    #[must_use]
+    pub fn new(known: Option<&'a TileRecord>, keep: bool) -> Self {
+        Self { known, keep, only_known: false }
+    }
 }
 
 /// Counters of one tile, and what is known of its rays.
