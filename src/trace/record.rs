@@ -229,8 +229,10 @@ impl TileRecord {
 
     /// Forgets which of several surfaces at one place was met first.
     pub fn forget_ties(&mut self) {
-        for met in self.paths.iter_mut().flat_map(|of_path| &mut of_path.met) {
-            if met.triangle & CROWDED != 0 {
+        for of_path in &mut self.paths {
+            // Of lists, any place may have changed.
+            let all = !of_path.behind.is_empty();
+            for met in of_path.met.iter_mut().filter(|met| all || met.triangle & CROWDED != 0) {
                 met.triangle |= BEHIND_INVISIBLE;
             }
         }
@@ -244,7 +246,11 @@ impl TileRecord {
                 + size_of_val(&path.met[..])
                 + size_of_val(&path.starts[..])
                 + size_of_val(&path.visibility[..])
-                + path.behind.iter().map(|behind| size_of_val(&behind.samples[..]) + size_of_val(&behind.met[..])).sum::<usize>()
+                + path
+                    .behind
+                    .iter()
+                    .map(|behind| size_of_val(&behind.samples[..]) + size_of_val(&behind.met[..]))
+                    .sum::<usize>()
                 + size_of::<PathRecord>()
         };
         self.paths.iter().map(of_path).sum()
@@ -269,7 +275,8 @@ impl TileRecord {
 
     /// The surfaces behind the first in the list of a node.
     pub(super) fn behind(&self, path: NodePath, sample: u32) -> impl Iterator<Item = Hit> + '_ {
-        let of_path = self.paths.binary_search_by_key(&path, |known| known.path).ok().map(|at| &self.paths[at].behind[..]);
+        let of_path =
+            self.paths.binary_search_by_key(&path, |known| known.path).ok().map(|at| &self.paths[at].behind[..]);
         of_path.unwrap_or_default().iter().map_while(move |behind| behind.hit(sample))
     }
 

@@ -100,7 +100,10 @@ impl TileTracer<'_> {
                     restyled.seconds += clock.seconds();
                     let batch = &context.outputs;
                     styles.extend(
-                        group.iter().enumerate().map(|(row, hit)| self.style(hit.hit.object, material, Outputs { batch, row })),
+                        group
+                            .iter()
+                            .enumerate()
+                            .map(|(row, hit)| self.style(hit.hit.object, material, Outputs { batch, row })),
                     );
                 }
                 restyled.hits += rows.len() as u64;

@@ -33,7 +33,9 @@ impl TileTracer<'_> {
             let surface = &hit.surface;
             let known = match work.known {
                 // Shadow rays start farther off where bodies touch, which depends on shaders.
-                Some(known) if hit.place == 0 && self.plan.bodies.is_empty() => known.visibility(&nodes[hit.ray.node as usize], &hit.ray, &hit.hit),
+                Some(known) if hit.place == 0 && self.plan.bodies.is_empty() => {
+                    known.visibility(&nodes[hit.ray.node as usize], &hit.ray, &hit.hit)
+                }
                 _ => &[],
             };
             for light in 0..self.lighting.len() {

@@ -334,13 +334,7 @@ impl<'a> TileTracer<'a> {
 
     /// What a ray meets, if a record tells, with its list of surfaces. Which surfaces a list holds is known only where
     /// none can be invisible.
-    fn known_hit(
-        &self,
-        work: &Work<'_>,
-        node: &TreeNode,
-        ray: &WaveRay,
-        list: &mut Vec<Hit>,
-    ) -> Option<Option<Hit>> {
+    fn known_hit(&self, work: &Work<'_>, node: &TreeNode, ray: &WaveRay, list: &mut Vec<Hit>) -> Option<Option<Hit>> {
         let known = work.known?;
         list.clear();
         if !self.keeps_list(node.path) {
