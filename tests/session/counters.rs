@@ -115,6 +115,7 @@ fn a_line_setting_runs_the_line_pass_and_the_film_alone() {
 #[test]
 fn tint_runs_the_line_pass_and_the_film_alone() {
     let mut desk = Desk::new();
+    desk.replace("normal = 40.0", "normal = 40.0\ncolor = [0.9, 0.3, 0.1]");
     for (old, new) in [("normal = 40.0", "normal = 40.0\ntint = false"), ("tint = false", "tint = true")] {
         let tinted = desk.replace(old, new);
         let redone = &tinted.redone;
@@ -156,7 +157,7 @@ fn lists_of_surfaces_are_restyled_and_shaded_with_rays_that_are_known() {
     let wider = desk.replace("line_width: p.ink * hit.uv.x", "line_width: p.ink * hit.uv.y");
     assert_eq!((rays(&wider), wider.redone.shaded), (0, 0), "{:?}", wider.redone);
     assert!(wider.redone.restyled > 0, "{:?}", wider.redone);
-    let wider = desk.replace("normal = 40.0", "normal = 40.0\nwidth = 3.0");
+    let wider = desk.replace("normal = 40.0", "normal = 40.0\nmin_width = 1.0");
     assert_eq!(rays(&wider), 0, "a line setting costs no rays: {:?}", wider.redone);
     let bluer = desk.replace("rgb(0.8, 0.2, 0.1)", "rgb(0.1, 0.2, 0.8)");
     assert_eq!((rays(&bluer), bluer.redone.traced), (0, 0), "{:?}", bluer.redone);
@@ -169,8 +170,9 @@ fn what_glass_shows_is_shaded_with_rays_that_are_known() {
     let glass = desk.replace("base_color: rgb(0.8, 0.2, 0.1) * hit.normal.y", "transmission: 1.0, roughness: 0.0");
     assert!(glass.stats.rays.refraction > 0);
     let lighter = desk.replace("rgb(0.5, 0.5, 0.5)", "rgb(0.7, 0.5, 0.5)");
-    let traced = lighter.stats.rays;
-    assert_eq!((traced.camera, traced.reflection, traced.refraction), (0, 0, 0), "{:?}", lighter.redone);
+    // But for a few that meet an edge, where it depends on shaders which of two triangles is seen.
+    let [few, all] = [&lighter, &glass].map(|picture| picture.stats.rays).map(|rays| rays.reflection + rays.refraction);
+    assert!(lighter.stats.rays.camera == 0 && few * 10 < all, "{few} of {all}");
     assert_eq!(lighter.redone.traced, 0, "{:?}", lighter.redone);
     desk.is_fresh(&lighter);
     let wider = desk.replace("line_width: p.ink * hit.uv.x", "line_width: p.ink * hit.uv.y");
