@@ -212,6 +212,12 @@ impl Plan {
         self.materials.iter().any(|material| material.used && (material.lights || material.behind.lights))
     }
 
+    /// Whether no surface in a list can turn out to be invisible, so that lists depend on no shader.
+    #[must_use]
+    pub fn lists_are_opaque(&self) -> bool {
+        self.bodies.is_empty() && !self.materials.iter().any(|material| material.used && material.see_through)
+    }
+
     /// Whether any ray but those of the camera may be traced along a path.
     #[must_use]
     pub fn has_secondary_rays(&self) -> bool {

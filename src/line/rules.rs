@@ -7,7 +7,7 @@ use super::types::TypeRules;
 use crate::math::portable;
 use crate::sample::NodePath;
 use crate::sample::position::gap_factor;
-use crate::scene::settings::{LineOverrides, LineSettings, RayKinds, Sampler};
+use crate::scene::settings::{Composition, LineOverrides, LineSettings, RayKinds, Sampler};
 
 /// [`LineSettings`] with all that follows from them and the sample rate worked out once.
 #[derive(Clone, Debug, PartialEq)]
@@ -121,6 +121,12 @@ impl Rules {
             && self.settings.paths == other.settings.paths
             && self.settings.surfaces == other.settings.surfaces
             && self.no_scripts() == other.no_scripts()
+    }
+
+    /// Whether lines look otherwise where nodes pass on other amounts of light.
+    #[must_use]
+    pub fn read_light(&self) -> bool {
+        self.settings.tint || self.settings.compose == Composition::Throughput
     }
 
     /// The same rules, knowing what each material's script changes about its lines, by material id.

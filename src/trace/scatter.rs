@@ -12,7 +12,7 @@ use crate::clock::CpuClock;
 use crate::math::{Vec2, Vec3, luminance};
 use crate::plan::MaterialPlan;
 use crate::sample::{Node, NodePath};
-use crate::scene::ids::MaterialId;
+use crate::scene::ids::{MaterialId, ObjectId};
 use crate::shade::analysis::inputs::LIMIT;
 use crate::shade::batch::{HitBatch, LightSample, OutputBatch};
 use crate::shade::bsdf::{Bounces, BsdfLanes, LANES, LightLanes, unit};
@@ -419,36 +419,43 @@ impl TileTracer<'_> {
         }
     }
 
-    pub(super) fn attributes(&self, hit: &WaveHit, cone: Cone, Outputs { batch, row }: Outputs<'_>) -> Node {
-        let object = &self.scene.objects()[hit.hit.object.index()];
+    pub(super) fn attributes(&self, hit: &WaveHit, cone: Cone, outputs: Outputs<'_>) -> Node {
         let placed = self.world.object(hit.hit.object);
-        let lines = self.scene.lines();
-        let width = value(&batch.line_width, row, None).unwrap_or(lines.width);
-        let priority = value(&batch.priority, row, None)
-            .or(object.priority)
-            .or(self.scene.materials()[hit.material.index()].priority)
-            .unwrap_or(0);
         let columns = self.plan.layout.columns;
         let uv = columns.uv.then(|| hit.surface.uv(placed, &hit.hit, 0));
         let stand_in = self.stand_ins.get(hit.hit.object.index()).copied().unwrap_or(hit.hit.object);
         let footprint = if columns.overlap { cone.after(hit.hit.t).footprint() } else { 0.0 };
         Node {
             object: stand_in.0 + 1,
-            member: hit.hit.object.0 + 1,
-            shader: hit.material.0 + 1,
             uv: uv.unwrap_or_default().to_array(),
             normal: hit.surface.normal.to_array(),
-            feature: value(&batch.feature, row, Vec3::ZERO).to_array(),
             depth: hit.depth,
+            position: hit.surface.position.to_array(),
+            geometric_normal: hit.surface.geometric_normal.to_array(),
+            footprint,
+            ..self.style(hit.hit.object, hit.material, outputs)
+        }
+    }
+
+    /// The part of a node's attributes that depends on its object and its shader's outputs alone; the rest is neutral.
+    pub(super) fn style(&self, id: ObjectId, material: MaterialId, Outputs { batch, row }: Outputs<'_>) -> Node {
+        let object = &self.scene.objects()[id.index()];
+        let lines = self.scene.lines();
+        let width = value(&batch.line_width, row, None).unwrap_or(lines.width);
+        let priority = value(&batch.priority, row, None)
+            .or(object.priority)
+            .or(self.scene.materials()[material.index()].priority)
+            .unwrap_or(0);
+        Node {
+            object: id.0 + 1,
+            member: id.0 + 1,
+            shader: material.0 + 1,
+            feature: value(&batch.feature, row, Vec3::ZERO).to_array(),
             line_color: value(&batch.line_color, row, None).unwrap_or(lines.color).to_array(),
             line_width: if object.lines { width } else { 0.0 },
             line_opacity: value(&batch.line_opacity, row, 1.0),
             priority,
-            position: hit.surface.position.to_array(),
-            geometric_normal: hit.surface.geometric_normal.to_array(),
-            footprint,
-            throughput: [1.0; 3],
-            contribution: [0.0; 3],
+            ..Node::default()
         }
     }
 
