@@ -74,7 +74,8 @@ pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Polygons, Diagnostic> {
 /// What is wrong, at its line.
 fn fault(path: &Path, bytes: &[u8], error: &ObjError) -> Diagnostic {
     let (line, message) = match error {
-        ObjError::Io(error) => return Diagnostic::error(error.to_string()).in_file(path),
+        // Nothing else can go wrong with bytes in memory.
+        ObjError::Io(_) => return Diagnostic::error("this file is not UTF-8 text").in_file(path),
         ObjError::MalformedFaceGroup { line_number, group } => {
             (line_number, format!("`{group}` is no corner of a face"))
         }
@@ -84,5 +85,6 @@ fn fault(path: &Path, bytes: &[u8], error: &ObjError) -> Diagnostic {
         ObjError::ZeroVertexNumber { line_number } => (line_number, "vertices are counted from 1".to_owned()),
     };
     let source = Source::new(path.display().to_string(), String::from_utf8_lossy(bytes));
-    Diagnostic::error(message).at(Span::word_at(&source, (*line).max(1), 1))
+    // The library counts lines from 0.
+    Diagnostic::error(message).at(Span::word_at(&source, line + 1, 1))
 }

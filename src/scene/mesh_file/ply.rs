@@ -89,7 +89,11 @@ impl PropertyAccess for Skipped {
 }
 
 pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Polygons, Diagnostic> {
-    let fault = |error: ParseError| Diagnostic::error(error.to_string()).in_file(path);
+    // What follows the first line is how the library came upon it.
+    let fault = |error: ParseError| {
+        let message = error.to_string();
+        Diagnostic::error(message.lines().next().unwrap_or("this is no PLY file")).in_file(path)
+    };
     let mut reader = Reader::new(bytes);
     let header = Parser::<Skipped>::new().read_header(&mut reader).map_err(fault)?;
     let mut mesh = Polygons::default();
