@@ -8,7 +8,9 @@ use crate::film::{Filter, Layer};
 use crate::line::{LineScript, Rules};
 use crate::sample::{NodeColumnSet, SampleLayout};
 use crate::scene::ids::MaterialId;
-use crate::scene::settings::{Background, FilterKind, LineOverrides, LineSettings, LineType, RayKinds};
+use crate::scene::settings::{
+    Background, FilterKind, LineOverrides, LineSettings, LineType, RayKinds, RenderSettings, Sampler,
+};
 use crate::scene::{Object, Scene};
 use crate::shade::analysis::OutputFact;
 use crate::shade::bsdf::MIRROR_ROUGHNESS;
@@ -355,7 +357,9 @@ fn plan_lines(scene: &Scene, shaders: &Shaders, layers: &[Layer]) -> Option<Line
     for id in settings.hidden.iter_mut().flat_map(|hidden| hidden.objects.iter_mut().flatten()) {
         *id = stand_ins.get(id.index()).copied().unwrap_or(*id);
     }
-    let rules = Rules::new(&settings, scene.render().samples).with_widest(widest).with_materials(&overrides);
+    let render = scene.render();
+    let rules = Rules::for_sampler(&settings, render.sampler, render.samples);
+    let rules = rules.with_widest(widest).with_materials(&overrides);
     let scripts: Vec<_> = shaders
         .iter()
         .zip(&draws)
@@ -421,7 +425,7 @@ fn explain(plan: &Plan, scene: &Scene, shaders: &Shaders) -> String {
     };
     let settings = scene.render();
     let [width, height] = settings.size;
-    row("picture", format!("{width} x {height}, {} samples per pixel", settings.samples));
+    row("picture", format!("{width} x {height}, {} samples per pixel", samples_name(settings)));
     row("filter", format!("{}, radius {} px", filter_name(settings.filter), settings.filter_radius));
     row("objects", format!("{} over {} triangles", scene.objects().len(), scene.triangle_count()));
     row("background", background_name(&settings.background).into());
@@ -673,6 +677,14 @@ fn shorten(names: &[&str]) -> String {
 /// The last part of a script's path: the same text wherever the scene lies.
 fn short_script_name(name: &str) -> &str {
     name.rsplit(['/', '\\']).next().unwrap_or(name)
+}
+
+/// How many samples, and how they are spread if not as they are by default.
+fn samples_name(settings: &RenderSettings) -> String {
+    match settings.sampler {
+        Sampler::Stratified => settings.samples.to_string(),
+        other => format!("{} {}", settings.samples, other.name()),
+    }
 }
 
 pub(crate) fn filter_name(kind: FilterKind) -> &'static str {

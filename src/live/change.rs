@@ -158,7 +158,7 @@ fn same_ties(old: &Scene, new: &Scene) -> bool {
 /// Whether the camera's rays start alike.
 fn same_sampling(old: &Scene, new: &Scene) -> bool {
     let (a, b) = (old.render(), new.render());
-    a.size == b.size && a.samples == b.samples && a.seed == b.seed
+    a.size == b.size && a.samples == b.samples && a.sampler == b.sampler && a.seed == b.seed
 }
 
 /// Whether lists keep the same surfaces of those that rays meet.

@@ -12,6 +12,8 @@ pub mod measure;
 pub mod report;
 pub mod run;
 pub mod table;
+pub mod truth;
+pub mod width;
 
 pub use flicker::{Flicker, FlickerOptions, flicker};
 pub use flip::{flip, mean_flip};

@@ -7,7 +7,6 @@
 use super::ray_tree::{Run, TreeNode, WaveHit, WaveRay};
 use super::record::TileRecord;
 use super::scatter::Outputs;
-use super::triangle::Ray;
 use super::wave::{RayCounts, TileTracer, TraceContext, Work};
 use super::world::Hit;
 use crate::clock::CpuClock;
@@ -150,12 +149,12 @@ impl TileTracer<'_> {
                 }
                 None => {
                     let pixel = samples.pixel_of(sample);
-                    let offset = self.positions.offset(pixel, sample % samples.samples_per_pixel);
+                    let offset = self.positions.of_pixel(pixel).offset(sample % samples.samples_per_pixel);
                     self.rays.ray(pixel, offset)
                 }
             };
             let ray = WaveRay { origin, direction, node: index as u32, after: None, passed: 0, media: 0, counted: 0 };
-            group.push(self.wave_hit(&ray, &Ray::new(origin, direction), &hit, &node, place));
+            group.push(self.wave_hit(&ray, &hit, &node, place));
             run.nodes.push(node);
         }
         Some((run, group))
