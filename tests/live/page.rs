@@ -186,7 +186,9 @@ fn a_memory_limit_that_is_too_small_is_told() {
     assert_eq!((cache.kept, cache.limit), (Kept::Nothing, 0));
     let mut events = Events::open(&format!("{}events", watching.url()));
     let picture = events.wait("picture", |picture| picture["final"] == true);
-    assert!(picture["memory"].as_str().is_some_and(|text| text.contains("only the picture is kept")), "{picture}");
+    let text = |name: &str| picture["memory"][name].as_str().unwrap_or("").to_owned();
+    assert_eq!(text("short"), "little memory: nothing is kept");
+    assert!(text("text").contains("only the picture is kept, and every edit renders all of it again"), "{picture}");
     // Where there is room, nothing is said.
     drop(watching);
     let watching = self::watching(&place);

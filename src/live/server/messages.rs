@@ -11,7 +11,7 @@ use super::super::controls::ControlGroup;
 use super::super::edit::KeyPath;
 use crate::diag::{Diagnostic, Diagnostics, Severity};
 use crate::film::View;
-use crate::live::{Kept, Redone};
+use crate::live::{CacheUse, Kept, Redone};
 use crate::sample::PixelRect;
 
 /// All that pages show of a scene but its picture.
@@ -90,8 +90,7 @@ pub(in crate::live) fn picture(shown: &ShownPicture, after: Option<Duration>) ->
             "film": seconds.film,
         },
         "redone": redone(&picture.redone),
-        // Only what is wrong with it.
-        "memory": (picture.cache.kept != Kept::All).then(|| picture.cache.to_string()),
+        "memory": memory(picture.cache),
         "total": seconds.total,
         "threads": stats.threads,
         "rays": stats.rays,
@@ -103,6 +102,16 @@ pub(in crate::live) fn picture(shown: &ShownPicture, after: Option<Duration>) ->
         })).collect::<Vec<_>>(),
     })
     .to_string()
+}
+
+/// What the memory limit leaves out, in short and in full; nothing if it leaves nothing out.
+fn memory(cache: CacheUse) -> Json {
+    let short = match cache.kept {
+        Kept::All => return Json::Null,
+        Kept::Samples => "little memory: rays are not kept",
+        Kept::Nothing => "little memory: nothing is kept",
+    };
+    json!({ "short": short, "text": format!("{cache}; --cache sets the limit") })
 }
 
 /// What was done again for a picture, and what was known already.
