@@ -2,6 +2,8 @@
 
 use serde::Serialize;
 
+use super::refine::Refinement;
+use super::timed::Choice;
 use crate::line::LineCounts;
 use crate::sample::GateCounts;
 use crate::trace::RayCounts;
@@ -31,6 +33,19 @@ pub struct Stats {
     pub shaders: Vec<ShaderStats>,
     /// The plan, as `tusche explain` prints it.
     pub plan: String,
+    /// How the samples were chosen, where it was not the scene or `--samples` that did.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sampling: Option<Sampling>,
+}
+
+/// How the samples were chosen.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Sampling {
+    /// By `--time`.
+    Time(Choice),
+    /// By `--error`.
+    Error(Refinement),
 }
 
 /// `total` is wall time; the others are CPU seconds summed over threads. Those of `load` and `build` count all that the
