@@ -60,6 +60,8 @@ pub struct ErrorGoal {
 }
 
 impl ErrorGoal {
+    /// The least error that can be asked for: what edges of full contrast come to with [`Self::MOST`] samples.
+    pub const LEAST: f64 = 0.0005;
     /// The most samples per pixel unless asked for otherwise.
     pub const MOST: u32 = 1024;
 }
@@ -141,10 +143,16 @@ pub fn render_to_error(
         let mut errors = ShadeErrors::default();
         let picture = PixelRect::of_size(scene.render().size);
         let crop = options.crop.map_or(picture, |crop| crop.intersection(&picture));
-        let all = Mask::new(scene.render().size, crop, BLOCK, |_| true);
-        let mut course = Course::new(goal, &all, Canvas::new(crop, &plan.layers));
+        // Whole blocks are looked at, so that a crop comes out as in the whole picture.
+        let whole = whole_blocks(crop).intersection(&picture);
+        let all = Mask::new(scene.render().size, whole, BLOCK, |_| true);
+        let mut course = Course::new(goal, &all, Canvas::new(whole, &plan.layers));
+        let emit = |course: &Course<'_>, block: usize| {
+            let rect = all.rect(block).intersection(&crop);
+            if rect.pixels() > 0 { emit(&course.canvas.tile(rect)) } else { Ok(()) }
+        };
         // Small tiles trace fewer samples for nothing around single blocks.
-        let options = RenderOptions { tile: options.tile.min(BLOCK), crop: Some(crop), ..options.clone() };
+        let options = RenderOptions { tile: options.tile.min(BLOCK), crop: Some(whole), ..options.clone() };
         let mut complete = true;
         let mut passes = 0;
         while let Some((rate, blocks)) = course.waiting.pop_first() {
@@ -169,13 +177,13 @@ pub fn render_to_error(
             }
             let fresh = fresh.into_inner().unwrap_or_else(PoisonError::into_inner);
             for block in course.take(rate, &blocks, &fresh) {
-                emit(&course.canvas.tile(all.rect(block)))?;
+                emit(&course, block)?;
             }
             passes += 1;
         }
         if !complete {
             let begun: Vec<_> = course.waiting.values().flatten().filter(|block| course.rates[**block] > 0).collect();
-            begun.into_iter().try_for_each(|block| emit(&course.canvas.tile(all.rect(*block))))?;
+            begun.into_iter().try_for_each(|block| emit(&course, *block))?;
         }
         totals.seconds.build = stage.build_seconds;
         let refinement = course.refinement();
@@ -184,6 +192,13 @@ pub fn render_to_error(
         report.stats.seconds.total = start.elapsed().as_secs_f64();
         Ok(report)
     })
+}
+
+/// The smallest rectangle of whole blocks that holds another.
+fn whole_blocks(rect: PixelRect) -> PixelRect {
+    let side = BLOCK as i32;
+    let (down, up) = (|x: i32| x.div_euclid(side) * side, |x: i32| (x + side - 1).div_euclid(side) * side);
+    PixelRect { x0: down(rect.x0), y0: down(rect.y0), x1: up(rect.x1), y1: up(rect.y1) }
 }
 
 /// How far the blocks of a picture are.

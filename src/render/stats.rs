@@ -149,3 +149,27 @@ pub fn peak_memory() -> Option<u64> {
     let kibibytes: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
     Some(kibibytes * 1024)
 }
+
+/// Makes [`peak_memory`] begin anew, at what the process holds now; whether the system can do that (Linux can).
+#[must_use]
+pub fn reset_peak_memory() -> bool {
+    std::fs::write("/proc/self/clear_refs", "5").is_ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_peak_is_forgotten_once_it_is_reset() {
+        const MANY: usize = 256 << 20;
+        let filled = std::hint::black_box(vec![1_u8; MANY]);
+        let Some(with) = peak_memory() else { return };
+        drop(filled);
+        assert!(peak_memory() >= Some(with), "a peak stays");
+        if reset_peak_memory() {
+            // Other tests of the process take memory meanwhile, but not that much.
+            assert!(peak_memory().is_some_and(|now| now < with - MANY as u64 / 2));
+        }
+    }
+}

@@ -79,6 +79,7 @@ fn point(point: &Point) -> Value {
         "cpu_seconds": point.cpu,
         "cpu_seconds_by_stage": stages,
         "bytes_per_sample": point.bytes_per_sample,
+        "peak_rss_bytes": point.peak,
         "errors": errors(&point.errors),
     })
 }
