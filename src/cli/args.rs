@@ -269,7 +269,7 @@ fn quality() -> impl TypedValueParser<Value = Quality> {
 
 fn error(text: &str) -> Result<f64, String> {
     match text.parse() {
-        Ok(error) if error >= ErrorGoal::LEAST && error < 1.0 => Ok(error),
+        Ok(error) if (ErrorGoal::LEAST..1.0).contains(&error) => Ok(error),
         Ok(error) if error > 0.0 && error < 1.0 => {
             Err(format!("{} is the least: less cannot be reached with {} samples", ErrorGoal::LEAST, ErrorGoal::MOST))
         }

@@ -3,6 +3,7 @@
 use super::args::{ExplainArguments, SceneArguments};
 use super::request::{Request, output_paths};
 use super::{Failure, print};
+use crate::study::Settings;
 
 pub(super) fn run(arguments: &ExplainArguments) -> Result<(), Failure> {
     let outputs = output_paths(&arguments.scene)?;
@@ -12,7 +13,7 @@ pub(super) fn run(arguments: &ExplainArguments) -> Result<(), Failure> {
         // What the scene itself says is known only without the preset.
         let own = SceneArguments { quality: None, quiet: true, ..arguments.scene.clone() };
         let own = Request::new(&own, arguments.scene.frame, &outputs)?;
-        text += &quality.explain(own.scene.render().samples);
+        text += &quality.explain(&Settings::of(&own.scene));
     }
     print(&text)
 }

@@ -13,7 +13,7 @@ use tusche::files::FileStore;
 use tusche::scene::file;
 use tusche::shade::{Host, Shaders};
 use tusche::study::report::summary::{MEASURES, Summary};
-use tusche::study::{Quality, Settings, StudyControl, StudyOptions, study};
+use tusche::study::{StudyControl, StudyOptions, study};
 
 const WIDTH: u32 = 200;
 /// More than this behind the front is a defect of the presets.
@@ -30,10 +30,14 @@ fn main() {
         arguments.iter().filter(|argument| !argument.starts_with("--")).map(PathBuf::from).collect();
     if scenes.is_empty() {
         let all = std::fs::read_dir(root.join("scenes")).expect("the scenes folder is there");
-        scenes.extend(all.flatten().map(|entry| entry.path()).filter(|path| path.extension().is_some_and(|end| end == "toml")));
+        scenes.extend(
+            all.flatten().map(|entry| entry.path()).filter(|path| path.extension().is_some_and(|end| end == "toml")),
+        );
         scenes.sort();
     }
-    println!("| scene | preset | CPU s/Mpx | line coverage error | position, px | FLIP | RMSE | behind the front | by |");
+    println!(
+        "| scene | preset | CPU s/Mpx | line coverage error | position, px | FLIP | RMSE | behind the front | by |"
+    );
     println!("|---|---|---|---|---|---|---|---|---|");
     let names = MEASURES.map(|measure| measure.name).join(",");
     let mut table = format!("scene,quality,samples,cpu_seconds_per_megapixel,{names},behind_front\n");
@@ -58,9 +62,7 @@ fn measure(path: &Path, table: &mut String) -> f64 {
     let [width, height] = builder.render.size;
     builder.render.size = [WIDTH, (WIDTH * height / width).max(1)];
     let megapixels = f64::from(WIDTH * builder.render.size[1]) * 1e-6;
-    // The presets are on the ladder of samples in any case.
     let scene = builder.build().unwrap_or_else(|faults| panic!("{faults}"));
-    let own = Settings::of(&scene);
     let (shaders, _) = Shaders::compile(&scene, &Host::new()).unwrap_or_else(|faults| panic!("{faults}"));
     let folder = tempfile::tempdir().expect("a temporary folder can be made");
     let options = StudyOptions { reference: 576, threads: 1, ..StudyOptions::default() };
@@ -68,9 +70,8 @@ fn measure(path: &Path, table: &mut String) -> f64 {
         .unwrap_or_else(|faults| panic!("{name}: {faults}"));
     let summary = Summary::new(&found);
     let mut worst = 0.0_f64;
-    for quality in Quality::ALL {
-        let wanted = Settings { samples: quality.samples(), ..own };
-        let Some(point) = summary.points.iter().find(|point| point.settings == wanted) else {
+    for (quality, index) in &found.ladder.presets {
+        let Some(point) = summary.points.iter().find(|point| point.index == *index) else {
             panic!("{name}: {} was not measured", quality.name());
         };
         let errors = MEASURES.map(|measure| point.error(measure.of).map_or(f64::NAN, |error| error.mean));

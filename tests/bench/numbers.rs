@@ -210,10 +210,9 @@ fn rays() {
     const SIZE: [u32; 2] = [640, 360];
     let rays = scene.camera().rays(SIZE);
     let pixels = (0..SIZE[1] as i32).flat_map(|y| (0..SIZE[0] as i32).map(move |x| [x, y]));
-    let rays: Vec<_> = pixels
-        .map(|pixel| rays.ray(pixel, [0.5; 2]).1.as_dvec3().to_array())
-        .collect();
-    let all = |closest: &dyn Fn([f64; 3]) -> Option<(u32, f64)>| rays.iter().map(|ray| closest(*ray)).collect::<Vec<_>>();
+    let rays: Vec<_> = pixels.map(|pixel| rays.ray(pixel, [0.5; 2]).1.as_dvec3().to_array()).collect();
+    let all =
+        |closest: &dyn Fn([f64; 3]) -> Option<(u32, f64)>| rays.iter().map(|ray| closest(*ray)).collect::<Vec<_>>();
     let (found, exact) = (all(&|ray| single.closest([0.0; 3], ray)), all(&|ray| double.closest([0.0; 3], ray)));
     let time = |closest: &dyn Fn([f64; 3]) -> Option<(u32, f64)>| {
         seconds(|| {
@@ -301,7 +300,9 @@ fn halved(buffer: &SampleBuffer, kept: Kept) -> (SampleBuffer, usize) {
 
 fn columns() {
     println!("Columns: 320 px wide, 16 samples; what changes if a column is kept in half floats.\n");
-    println!("| scene | column | bytes/sample | lined samples that change | line coverage error | greatest change of a colour, of 255 |");
+    println!(
+        "| scene | column | bytes/sample | lined samples that change | line coverage error | greatest change of a colour, of 255 |"
+    );
     println!("|---|---|---|---|---|---|");
     let (mut searched, mut samples) = (0.0, 0);
     for name in ["fig1_robot", "fig2_crossings", "hello", "glass", "pencil"] {
@@ -412,7 +413,13 @@ macro_rules! by_hand {
                         }
                     }
                     let brightness = luminance(sum);
-                    let tone: F = if brightness < 0.15 { 0.0 } else if brightness < 0.6 { 0.6 } else { 1.0 };
+                    let tone: F = if brightness < 0.15 {
+                        0.0
+                    } else if brightness < 0.6 {
+                        0.6
+                    } else {
+                        1.0
+                    };
                     let (shadow, paint): (F, F) = (0.35, 0.90);
                     out.push([2.0 * (1.4 - 0.4 * tone), shadow * paint * (1.0 - tone) + paint * tone]);
                 }
@@ -441,13 +448,13 @@ fn scripts() {
     const BATCH: usize = 4096;
     let batches: Vec<HitBatch> = (0..HITS / BATCH).map(|seed| synthetic::hits(BATCH, seed as u64)).collect();
     println!("Scripts: {HITS} hits.\n");
-    println!("| shader | f32, ns | f64, ns | greatest difference of a width, px | of a colour | hits that fall into another band |");
+    println!(
+        "| shader | f32, ns | f64, ns | greatest difference of a width, px | of a colour | hits that fall into another band |"
+    );
     println!("|---|---|---|---|---|---|");
     type Run<F> = fn(&HitBatch, &mut Vec<[F; 2]>);
-    let shaders: [(&str, Run<f32>, Run<f64>); 2] = [
-        ("cel", short::cel, long::cel),
-        ("light_driven_width", short::light_driven_width, long::light_driven_width),
-    ];
+    let shaders: [(&str, Run<f32>, Run<f64>); 2] =
+        [("cel", short::cel, long::cel), ("light_driven_width", short::light_driven_width, long::light_driven_width)];
     for (name, short, long) in shaders {
         let (mut a, mut b) = (Vec::new(), Vec::new());
         let (mut greatest, mut other_band) = ([0.0_f64; 2], 0);
@@ -468,9 +475,6 @@ fn scripts() {
         };
         let fast = time(&mut |batch| short(batch, black_box(&mut a)));
         let slow = time(&mut |batch| long(batch, black_box(&mut b)));
-        println!(
-            "| {name} | {fast:.1} | {slow:.1} | {:.1e} | {:.1e} | {other_band} |",
-            greatest[0], greatest[1]
-        );
+        println!("| {name} | {fast:.1} | {slow:.1} | {:.1e} | {:.1e} | {other_band} |", greatest[0], greatest[1]);
     }
 }

@@ -80,7 +80,7 @@ fn a_study_writes_a_table_numbers_pictures_and_a_page() {
 
     let found = numbers(&place.folder.path().join("out"));
     let keys: Vec<_> = found.as_object().map(|map| map.keys().map(String::as_str).collect()).unwrap_or_default();
-    let expected = "scene size version threads complete left_out_for_time reference knobs knobs_that_do_not_matter points fits fronts";
+    let expected = "scene size version threads complete left_out_for_time reference knobs knobs_that_do_not_matter points fits fronts presets";
     assert_eq!(keys.join(" "), expected);
     assert_eq!((&found["complete"], &found["left_out_for_time"]), (&Value::Bool(true), &Value::from(0)));
     let points = found["points"].as_array().expect("there are points");
@@ -96,6 +96,17 @@ fn a_study_writes_a_table_numbers_pictures_and_a_page() {
         point["errors"]["line_coverage"]["mean"].as_f64().expect("there are lines")
     };
     assert!(coverage(144) < 0.3 * coverage(4), "{} {}", coverage(144), coverage(4));
+    let presets = found["presets"].as_array().expect("there are presets");
+    let names: Vec<_> = presets.iter().map(|preset| preset["name"].as_str().unwrap_or_default()).collect();
+    assert_eq!(names, ["draft", "preview", "final"]);
+    for (preset, samples) in presets.iter().zip([4, 16, 64]) {
+        let point = points.iter().find(|point| point["point"] == preset["point"]).expect("the point was measured");
+        assert!(point["settings"]["samples"] == samples && preset["behind_front"]["flip"].is_number(), "{preset}");
+    }
+    if cfg!(target_os = "linux") {
+        assert!(points.iter().all(|point| point["peak_rss_bytes"].as_f64().is_some_and(|peak| peak > 1e6)));
+        assert!(read(&place, "out/index.html").contains("Most memory that the process held"));
+    }
     let fit = &found["fits"][0];
     assert_eq!((&fit["knob"], &fit["error"]), (&"samples".into(), &"line_coverage".into()));
     let slope = fit["exponent"]["by_samples"].as_f64().expect("a slope is fitted");

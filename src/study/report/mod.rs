@@ -46,6 +46,13 @@ pub fn json(study: &Study, summary: &Summary) -> Value {
         let front: Vec<usize> = summary.front(measure).iter().map(|point| point.index).collect();
         (measure.name.to_owned(), json!(front))
     });
+    let presets = study.ladder.presets.iter().map(|(quality, point)| {
+        let behind = MEASURES.iter().filter_map(|measure| {
+            let behind = summary.behind_front(*point, measure);
+            behind.is_finite().then(|| (measure.name.to_owned(), json!(behind)))
+        });
+        json!({ "name": quality.name(), "point": point, "behind_front": behind.collect::<Map<_, _>>() })
+    });
     let threads = study.runs.iter().flatten().next().map(|run| run.threads);
     json!({
         "scene": study.title,
@@ -64,6 +71,7 @@ pub fn json(study: &Study, summary: &Summary) -> Value {
         "points": summary.points.iter().map(point).collect::<Vec<_>>(),
         "fits": fits.collect::<Vec<_>>(),
         "fronts": fronts.collect::<Map<_, _>>(),
+        "presets": presets.collect::<Vec<_>>(),
     })
 }
 

@@ -24,6 +24,7 @@ pub(super) fn page(study: &Study, summary: &Summary, folder: &Folder) -> String 
     let parts = [
         head(study, summary),
         plots(study, summary),
+        presets(study, summary),
         costs(study, summary),
         pictures(study, summary, folder),
         tables(study, summary),
@@ -169,6 +170,31 @@ fn plot<'a>(study: &Study, summary: &Summary, measure: &'a Measure, fit: Option<
         front: summary.front(measure).iter().filter_map(corner).filter(|[_, error]| *error > 0.0).collect(),
         floor: (measure.of)(&study.own).filter(|floor| *floor > 0.0),
     }
+}
+
+/// Where the presets of `--quality` lie.
+fn presets(study: &Study, summary: &Summary) -> String {
+    let known = |index: usize| summary.points.iter().find(|point| point.index == index);
+    let rows = study.ladder.presets.iter().filter_map(|(quality, index)| {
+        let point = known(*index)?;
+        let mut cells = vec![quality.name().to_owned(), point.settings.samples.to_string(), number(point.cpu.median)];
+        cells.extend(MEASURES.iter().map(|measure| {
+            let behind = summary.behind_front(*index, measure);
+            let error = point.error(measure.of).map_or_else(|| "–".to_owned(), |error| number(error.mean));
+            format!("{error} <span class=\"soft\">({behind:.2})</span>")
+        }));
+        Some(format!("<tr><td>{}</td></tr>", cells.join("</td><td>")))
+    });
+    let rows: Vec<_> = rows.collect();
+    if rows.is_empty() {
+        return String::new();
+    }
+    format!(
+        "<h2>Presets</h2>\n<p>What <i>--quality</i> chooses. In brackets: by which factor another point is both faster and nearer to the \
+         reference; up to 1 lies on the front.</p>\n<div class=\"wide\"><table>\n<thead><tr><th>preset</th><th>samples</th><th>CPU, s</th>\
+         <th>coverage</th><th>position, px</th><th>FLIP</th><th>RMSE</th></tr></thead>\n<tbody>\n{}\n</tbody></table></div>\n",
+        rows.join("\n")
+    )
 }
 
 fn costs(study: &Study, summary: &Summary) -> String {
