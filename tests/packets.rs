@@ -3,7 +3,7 @@
 use proptest::prelude::*;
 use tusche::math::{DAffine3, DQuat, DVec3, Vec3};
 use tusche::scene::camera::{Camera, Projection};
-use tusche::scene::ids::MaterialId;
+use tusche::scene::ids::{MaterialId, ObjectId};
 use tusche::scene::material::{Material, Script};
 use tusche::scene::mesh::Mesh;
 use tusche::scene::settings::RayKinds;
@@ -12,6 +12,7 @@ use tusche::trace::World;
 use tusche::trace::packet::{LANES, RayStart};
 use tusche::trace::triangle::Ray;
 use tusche::trace::world::Hit;
+use tusche::trace::world_packet::{ShadowRay, Way};
 
 /// Coordinates among which some are equal, so that rays meet edges, vertices, coplanar and flat triangles, and run along
 /// axes and faces of boxes.
@@ -125,6 +126,43 @@ proptest! {
                     prop_assert_eq!(bits(found[lane]), bits(single), "{} {}", origin, direction);
                 }
                 prop_assert!(found[rays.len()..].iter().all(Option::is_none));
+            }
+        }
+    }
+
+    /// Everything is opaque, nothing is, or what is seen from the front only; rays leave triangles that they meet.
+    #[test]
+    fn packets_are_blocked_where_single_rays_are(
+        world in world(),
+        packets in proptest::collection::vec(packet(), 1..40),
+        which in 0..3u32,
+        reach in prop_oneof![Just(f32::INFINITY), 0.1f32..4.0],
+        leaves_what_it_meets in any::<bool>(),
+    ) {
+        let opaque = |id: MaterialId| which == 2 || which == 1 && id == MaterialId(1);
+        for rays in packets {
+            let shadow: Vec<ShadowRay> = rays
+                .iter()
+                .map(|&start| {
+                    let met = world.closest(&Ray::new(start.0, start.1), RayKinds::SHADOW, f32::INFINITY);
+                    let leaves = met.filter(|_| leaves_what_it_meets).map_or((ObjectId(0), u32::MAX), |hit| hit.facet());
+                    ShadowRay { start, reach, leaves }
+                })
+                .collect();
+            let ways = world.blocked_of(&shadow, &opaque);
+            let mut passed = Vec::new();
+            for (ray, way) in shadow.iter().zip(ways) {
+                let single = Ray::new(ray.start.0, ray.start.1);
+                let blocked = world.blocked(&single, reach, Some(ray.leaves), opaque, &mut passed);
+                match way {
+                    Way::Unknown => {}
+                    Way::Blocked => prop_assert!(blocked, "{:?}", ray),
+                    Way::Clear => prop_assert!(!blocked && passed.is_empty(), "{:?} {:?}", ray, passed),
+                }
+                // Nobody looks at packets that are none; else only what is not opaque leaves a doubt.
+                if which == 2 && ways.iter().take(shadow.len()).any(|way| *way != Way::Unknown) {
+                    prop_assert_ne!(way, Way::Unknown);
+                }
             }
         }
     }

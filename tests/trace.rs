@@ -151,7 +151,7 @@ fn rays_that_leave_a_surface_do_not_meet_it_again_at_any_scale() {
             let target = Vec3::new(random(&mut state), random(&mut state), random(&mut state)) * size.as_vec3();
             let ray = Ray::new(Vec3::ZERO, (target - world.origin.as_vec3()).normalize());
             let Some(hit) = world.closest(&ray, RayKinds::CAMERA, f32::INFINITY) else { continue };
-            let surface = Surface::new(&world, &ray, &hit);
+            let surface = Surface::new(&world, ray.direction, &hit);
             // A ball is convex: what leaves it outwards, even along it, meets nothing.
             for _ in 0..4 {
                 let any = Vec3::new(random(&mut state), random(&mut state), random(&mut state)).normalize();
@@ -302,7 +302,7 @@ fn rays_that_leave_far_turned_and_stretched_objects_do_not_meet_them_again() {
             let target = (center + linear.transform_point3(inside * 0.55) - world.origin).as_vec3();
             let ray = Ray::new(Vec3::ZERO, target.normalize());
             let Some(hit) = world.closest(&ray, RayKinds::CAMERA, f32::INFINITY) else { continue };
-            let surface = Surface::new(&world, &ray, &hit);
+            let surface = Surface::new(&world, ray.direction, &hit);
             let any = Vec3::new(random(&mut state), random(&mut state), random(&mut state)).normalize();
             let along = (any - surface.geometric_normal * any.dot(surface.geometric_normal)).normalize();
             for direction in [surface.geometric_normal, along + surface.geometric_normal * 1e-3] {

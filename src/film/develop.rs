@@ -8,14 +8,16 @@
 //! and these partial sums are added to the targets. A target so receives its partial sums in row order of the sources,
 //! and each is a sum in order of samples: no tile size and no neighbouring tile changes a bit. The weights along x
 //! and y of a sample are looked up once and serve all targets and layers; the lined picture shares the sums of the
-//! plain one wherever a pixel has no line, which is nearly everywhere.
+//! plain one wherever a pixel has no line, which is nearly everywhere. A pixel that only equal samples reach has their
+//! value, and none of this is done for it (`even`).
 
+use super::even::EvenGround;
 use super::filter::Filter;
 use super::layer::{FilmTile, Layer, LinePath};
 use super::spread::{Spread, Sums};
 use crate::line::{LineBuffer, LineType, SeenLine};
 use crate::math::{Vec3, Vec4};
-use crate::sample::{PixelRect, SampleBuffer};
+use crate::sample::{Column, PixelRect, SampleBuffer};
 
 /// Tiles of samples with their lines, in a grid as in [`crate::line::Window`].
 #[derive(Clone, Debug)]
@@ -112,10 +114,14 @@ fn filter_fields(window: &FilmWindow<'_>, rect: PixelRect, filter: &Filter, fiel
     if fields.is_empty() {
         return Vec::new();
     }
+    let ground = even_ground(window, rect, filter.reach(), fields);
     let mut spread = Spread::new(filter, rect);
     let mut sums = vec![Sums::new(filter, rect); fields.len()];
     let (mut values, mut plain_part, mut part) = (Vec::new(), Vec::new(), Vec::new());
     window.visit(rect.grown(filter.reach()), |pixel| {
+        if !ground.is_filtered([pixel.x, pixel.y]) {
+            return;
+        }
         spread.weigh(filter, [pixel.x, pixel.y], &pixel.buffer.offset[pixel.first..pixel.end]);
         let mut plain_done = false;
         for (field, sums) in fields.iter().zip(&mut sums) {
@@ -148,7 +154,26 @@ fn filter_fields(window: &FilmWindow<'_>, rect: PixelRect, filter: &Filter, fiel
             }
         });
     }
+    for (field, filtered) in filtered.iter_mut().enumerate() {
+        let pixels = (rect.y0..rect.y1).flat_map(|y| (rect.x0..rect.x1).map(move |x| [x, y]));
+        for (filtered, pixel) in filtered.iter_mut().zip(pixels) {
+            *filtered = ground.value(pixel, field).unwrap_or(*filtered);
+        }
+    }
     filtered
+}
+
+/// Where no filter is needed.
+fn even_ground(window: &FilmWindow<'_>, rect: PixelRect, reach: i32, fields: &[Field]) -> EvenGround {
+    let sources = rect.grown(reach);
+    let mut values = vec![None; sources.pixels() * fields.len()];
+    window.visit(sources, |pixel| {
+        let place = index_in(sources, pixel.x, pixel.y) * fields.len();
+        for (value, field) in values[place..].iter_mut().zip(fields) {
+            *value = field.one_value(&pixel);
+        }
+    });
+    EvenGround::new(rect, reach, fields.len(), values)
 }
 
 fn index_in(rect: PixelRect, x: i32, y: i32) -> usize {
@@ -286,6 +311,30 @@ impl Field {
             Layer::LinePath(path) => has_lines.then_some(Self::Lines(Shown::AtPath(*path))),
             Layer::Aov(index, _) => Some(Self::Aov(*index)),
             Layer::Depth | Layer::Normal | Layer::Position | Layer::Uv | Layer::Object | Layer::Feature => None,
+        }
+    }
+
+    /// The value that all samples of a pixel have; `None` if they differ, or it takes more than a look to tell.
+    fn one_value(self, pixel: &SourcePixel<'_>) -> Option<Vec4> {
+        let samples = pixel.first..pixel.end;
+        let buffer = pixel.buffer;
+        match self {
+            Self::Plain | Self::Lined | Self::Below => {
+                let (first, rest) = buffer.color[samples.clone()].split_first()?;
+                let alpha = buffer.alpha.get(pixel.first);
+                let is_one = (self == Self::Plain || pixel.lines.is_empty())
+                    && rest.iter().all(|color| color == first)
+                    && (matches!(buffer.alpha, Column::Constant(_))
+                        || samples.into_iter().all(|sample| buffer.alpha.get(sample) == alpha));
+                is_one.then(|| Vec3::from(*first).extend(alpha))
+            }
+            Self::Lines(lines) => (!pixel.lines.iter().any(|line| lines.contains(line))).then_some(Vec4::ZERO),
+            Self::Aov(index) => {
+                let Some(column) = buffer.aovs.get(index) else { return Some(Vec4::ZERO) };
+                let first = column.get(pixel.first);
+                let is_one = samples.into_iter().all(|sample| column.get(sample) == first);
+                is_one.then(|| Vec3::from(first).extend(0.0))
+            }
         }
     }
 

@@ -8,6 +8,7 @@ mod atomic;
 mod blocks;
 pub mod compare;
 pub mod develop;
+mod even;
 mod exr;
 pub mod filter;
 pub mod layer;

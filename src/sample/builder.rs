@@ -4,6 +4,8 @@
 //! copies nothing. A column starts as [`Column::Constant`], becomes a [`Column::Palette`] at the first value that differs and
 //! one value per row when there are too many, so uniform columns never cost memory.
 
+use std::ops::{Range, RangeInclusive};
+
 use super::buffer::{Column, Node, NodeColumnSet, NodeColumns, PixelRect, Rows, SampleBuffer, SampleColor};
 use super::gate::{Faults, GateLog, clean_node};
 use super::path::NodePath;
@@ -148,6 +150,19 @@ impl SampleBufferBuilder {
         self.paths[self.last].push(sample, &node, self.layout.columns);
     }
 
+    /// Adds one and the same node to a row of samples, none of which has a node at its path yet.
+    pub fn push_same(&mut self, path: NodePath, samples: RangeInclusive<u32>, node: Node) {
+        let (&first, &last) = (samples.start(), samples.end());
+        self.push(path, first, node);
+        if first == last {
+            return;
+        }
+        assert!((last as usize) < self.offset.len(), "sample {last} lies outside the buffer");
+        let (node, faults) = clean_node(node, self.layout.columns, self.layout.max_width_of(node.shader));
+        samples.skip(1).for_each(|sample| self.gate.note(path, sample, node.shader, faults));
+        self.paths[self.last].repeat(first + 1..last + 1, self.layout.columns);
+    }
+
     /// Sorts the nodes and closes the buffer. A sample without a camera node gets a miss.
     #[must_use]
     pub fn finish(mut self) -> SampleBuffer {
@@ -189,12 +204,12 @@ impl SampleBufferBuilder {
 
     fn add_missing_camera_nodes(&mut self) {
         let camera = &mut self.paths[0];
-        if camera.rising && camera.sample.len() == self.offset.len() {
+        if camera.samples.rising && camera.samples.len() == self.offset.len() {
             return;
         }
         let mut present = vec![false; self.offset.len()];
-        for &sample in &camera.sample {
-            present[sample as usize] = true;
+        for row in 0..camera.samples.len() {
+            present[camera.samples.get(row) as usize] = true;
         }
         for sample in (0..).zip(present).filter_map(|(sample, present)| (!present).then_some(sample)) {
             camera.push(sample, &Node::default(), self.layout.columns);
@@ -208,9 +223,7 @@ struct PathRows {
     path: NodePath,
     /// How many rows to make room for.
     expected: usize,
-    /// Whether `sample` has been strictly rising.
-    rising: bool,
-    sample: Vec<u32>,
+    samples: RowSamples,
     object: Column<u32>,
     member: Column<u32>,
     shader: Column<u32>,
@@ -229,14 +242,57 @@ struct PathRows {
     contribution: Column<[f32; 3]>,
 }
 
+/// The sample of each row. While rows and samples are the same numbers, as at the camera's path, none is written down.
+#[derive(Debug)]
+struct RowSamples {
+    /// Rows without `listed`.
+    count: u32,
+    listed: Option<Vec<u32>>,
+    /// Whether samples have been strictly rising.
+    rising: bool,
+}
+
+impl Default for RowSamples {
+    fn default() -> Self {
+        Self { count: 0, listed: None, rising: true }
+    }
+}
+
+impl RowSamples {
+    fn len(&self) -> usize {
+        self.listed.as_ref().map_or(self.count as usize, Vec::len)
+    }
+
+    fn get(&self, row: usize) -> u32 {
+        self.listed.as_ref().map_or(row as u32, |listed| listed[row])
+    }
+
+    #[inline]
+    fn push(&mut self, sample: u32, expected: usize) {
+        match &mut self.listed {
+            None if sample == self.count => self.count += 1,
+            None => {
+                let mut listed = Vec::with_capacity(expected.max(self.count as usize + 1));
+                listed.extend(0..self.count);
+                self.rising = sample > self.count;
+                listed.push(sample);
+                self.listed = Some(listed);
+            }
+            Some(listed) => {
+                self.rising &= listed.last().is_none_or(|&last| last < sample);
+                listed.push(sample);
+            }
+        }
+    }
+}
+
 impl PathRows {
     fn new(path: NodePath, expected: usize) -> Self {
         let neutral = Node::default();
         Self {
             path,
             expected,
-            rising: true,
-            sample: Vec::with_capacity(expected),
+            samples: RowSamples::default(),
             object: Column::Constant(neutral.object),
             member: Column::Constant(neutral.member),
             shader: Column::Constant(neutral.shader),
@@ -257,9 +313,8 @@ impl PathRows {
     }
 
     fn push(&mut self, sample: u32, node: &Node, kept: NodeColumnSet) {
-        let (row, expected) = (self.sample.len(), self.expected);
-        self.rising &= self.sample.last().is_none_or(|&last| last < sample);
-        self.sample.push(sample);
+        let (row, expected) = (self.samples.len(), self.expected);
+        self.samples.push(sample, expected);
         self.object.push(row, node.object, expected);
         self.shader.push(row, node.shader, expected);
         if kept.depth {
@@ -298,25 +353,71 @@ impl PathRows {
         }
     }
 
+    /// Gives further samples the node of the last row.
+    fn repeat(&mut self, samples: Range<u32>, kept: NodeColumnSet) {
+        let count = samples.len();
+        for sample in samples {
+            self.samples.push(sample, self.expected);
+        }
+        self.object.repeat(count);
+        self.shader.repeat(count);
+        if kept.depth {
+            self.depth.repeat(count);
+        }
+        if kept.uv {
+            self.uv.repeat(count);
+        }
+        if kept.normal {
+            self.normal.repeat(count);
+        }
+        if kept.feature {
+            self.feature.repeat(count);
+        }
+        if kept.lines {
+            self.line_color.repeat(count);
+            self.line_width.repeat(count);
+            self.line_opacity.repeat(count);
+            self.priority.repeat(count);
+        }
+        if kept.member {
+            self.member.repeat(count);
+        }
+        if kept.overlap || kept.position {
+            self.position.repeat(count);
+        }
+        if kept.overlap {
+            self.geometric_normal.repeat(count);
+            self.footprint.repeat(count);
+        }
+        if kept.throughput {
+            self.throughput.repeat(count);
+        }
+        if kept.contribution {
+            self.contribution.repeat(count);
+        }
+    }
+
     /// The columns of the samples to be kept.
     fn finish(self, rect: &PixelRect, samples_per_pixel: u32, keep: impl Fn(u32) -> bool) -> NodeColumns {
-        let all_kept = self.sample.iter().all(|&sample| keep(sample));
-        let order = (!self.rising || !all_kept).then(|| {
-            let rows = (0..).zip(&self.sample);
-            let mut order: Vec<u32> = rows.filter_map(|(row, &sample)| keep(sample).then_some(row)).collect();
-            order.sort_by_key(|&row| self.sample[row as usize]);
-            order.dedup_by_key(|row| self.sample[*row as usize]);
+        let samples = &self.samples;
+        let rows = 0..samples.len() as u32;
+        let sample_of = |row: u32| samples.get(row as usize);
+        let all_kept = rows.clone().all(|row| keep(sample_of(row)));
+        let order = (!samples.rising || !all_kept).then(|| {
+            let mut order: Vec<u32> = rows.clone().filter(|&row| keep(sample_of(row))).collect();
+            order.sort_by_key(|&row| sample_of(row));
+            order.dedup_by_key(|row| sample_of(*row));
             order
         });
         let order = order.as_deref();
-        let sample = match order {
-            Some(order) => order.iter().map(|&row| self.sample[row as usize]).collect(),
-            None => self.sample,
-        };
         let all = rect.pixels() * samples_per_pixel as usize;
-        let rows = if sample.len() == all {
+        let rows = if order.map_or(samples.len(), <[u32]>::len) == all {
             Rows::Every { samples: all as u32, per_pixel: samples_per_pixel }
         } else {
+            let sample: Vec<u32> = match order {
+                Some(order) => order.iter().map(|&row| sample_of(row)).collect(),
+                None => rows.map(sample_of).collect(),
+            };
             let mut first = vec![0; rect.pixels() + 1];
             for &sample in &sample {
                 first[(sample / samples_per_pixel) as usize + 1] += 1;
@@ -373,6 +474,23 @@ impl<T: Copy + PartialEq> Column<T> {
                 places.push(1);
                 *self = Self::Palette { values: vec![*constant, value], places };
             }
+        }
+    }
+
+    /// Appends the value of the last row some times more.
+    fn repeat(&mut self, count: usize) {
+        match self {
+            Self::Values(values) => {
+                if let Some(&last) = values.last() {
+                    values.resize(values.len() + count, last);
+                }
+            }
+            Self::Palette { places, .. } => {
+                if let Some(&last) = places.last() {
+                    places.resize(places.len() + count, last);
+                }
+            }
+            Self::Constant(_) => {}
         }
     }
 

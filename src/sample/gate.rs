@@ -71,6 +71,9 @@ impl Faults {
     /// [`Self::summand`] of each component.
     #[inline]
     pub(super) fn numbers<const N: usize>(&mut self, x: [f32; N]) -> [f32; N] {
+        if x.iter().all(|x| x.abs() <= LARGEST) {
+            return x.map(|x| x + 0.0);
+        }
         x.map(|x| self.summand(x))
     }
 

@@ -103,14 +103,14 @@ impl World {
     /// All hits at the place of the nearest one but those that are `elsewhere`, first to last.
     #[cold]
     fn place_of(&self, ray: &Ray, kind: RayKinds, near: &Nearest, elsewhere: &[Hit]) -> Place {
-        let nearest = Surface::new(self, ray, &near.hit);
+        let nearest = Surface::new(self, ray.direction, &near.hit);
         let normal = nearest.geometric_normal;
         let mut at = Place::new();
         self.each_hit(ray, kind, near.hit.t + near.slack, |hit, _, _| {
             if hit.t < near.hit.t || is_among(elsewhere, &hit) {
                 return true;
             }
-            let there = Surface::new(self, ray, &hit);
+            let there = Surface::new(self, ray.direction, &hit);
             let apart = normal.dot(there.position - nearest.position).abs();
             if hit.facet() == near.hit.facet() || apart <= normal.abs().dot(nearest.error + there.error) {
                 at.push(Hit { t: near.hit.t, ..hit });

@@ -116,7 +116,7 @@ impl TileTracer<'_> {
                 let ray = Ray::new(wave_ray.origin, wave_ray.direction);
                 self.surface_list(&ray, work.count(node.kind), wave_ray, absent, &mut list);
                 let behind = list.iter().enumerate().skip(1);
-                hits.extend(behind.map(|(place, hit)| self.wave_hit(wave_ray, &ray, hit, node, place)));
+                hits.extend(behind.map(|(place, hit)| self.wave_hit(wave_ray, hit, node, place)));
             }
         }
         run.behind = hits;

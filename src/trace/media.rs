@@ -254,9 +254,9 @@ impl TileTracer<'_> {
         if at.len() < 2 {
             return Vec3::ZERO;
         }
-        let position = Surface::new(self.world, ray, hit).position;
+        let position = Surface::new(self.world, ray.direction, hit).position;
         at.iter().fold(Vec3::ZERO, |spread, other| {
-            let other = Surface::new(self.world, ray, other);
+            let other = Surface::new(self.world, ray.direction, other);
             spread.max((other.position - position).abs() + other.error)
         })
     }
@@ -306,7 +306,7 @@ impl TileTracer<'_> {
         let mut media = Media::AIR;
         for (hit, ray) in &ends {
             let from = WaveRay { origin, direction: ray.direction, node, after: None, passed: 0, media: 0, counted: 0 };
-            let end = self.wave_hit(&from, ray, hit, &run.nodes[node as usize], 0);
+            let end = self.wave_hit(&from, hit, &run.nodes[node as usize], 0);
             if let Some(body) = self.body_at(&end, run, context, work) {
                 media.enter(body);
             }

@@ -28,7 +28,7 @@ pub mod tree;
 pub mod triangle;
 pub mod wave;
 pub mod world;
-mod world_packet;
+pub mod world_packet;
 
 pub use record::TileRecord;
 pub use restyle::Restyled;

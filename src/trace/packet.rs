@@ -9,7 +9,7 @@
 //! (`LaneRays::shear`) and are traced one at a time.
 
 use super::mesh_tree::{MeshTree, WIDTH};
-use super::tree::{BOX_FAR_SCALE, BOX_NEAR_SCALE, Leaf, Slabs};
+use super::tree::{BOX_FAR_SCALE, BOX_NEAR_SCALE, Leaf, Slabs, Visitor};
 use super::triangle::{MOST_SLACK, NOT_AHEAD, Ray, normal_and_size};
 use crate::math::{Mat3, Vec3, Vec4};
 
@@ -41,6 +41,20 @@ pub(super) fn largest(lanes: &Lanes) -> f32 {
     lanes.iter().fold(f32::NEG_INFINITY, |largest, &lane| max(largest, lane))
 }
 
+/// Vectors by axis, times a matrix.
+#[inline(always)]
+fn product(matrix: &Mat3, [x, y, z]: &[Lanes; 3]) -> [Lanes; 3] {
+    let [mx, my, mz] = matrix.to_cols_array_2d();
+    [0, 1, 2].map(|axis: usize| {
+        let (mx, my, mz) = (mx[axis], my[axis], mz[axis]);
+        let mut lanes = [0.0; LANES];
+        for i in 0..LANES {
+            lanes[i] = mx * x[i] + my * y[i] + mz * z[i];
+        }
+        lanes
+    })
+}
+
 /// The rays of a packet in one space.
 #[derive(Clone, Copy)]
 pub(super) struct LaneRays {
@@ -65,8 +79,9 @@ impl LaneRays {
         Some(Self::new(origin, direction))
     }
 
+    /// Rays by axis.
     #[inline(always)]
-    fn new(origin: [Lanes; 3], direction: [Lanes; 3]) -> Self {
+    pub fn new(origin: [Lanes; 3], direction: [Lanes; 3]) -> Self {
         let mut inverse = [[0.0; LANES]; 3];
         for (inverse, direction) in inverse.iter_mut().zip(&direction) {
             for i in 0..LANES {
@@ -81,18 +96,11 @@ impl LaneRays {
     /// The rays in the space of an object, as [`super::world::PlacedObject`] places single rays there.
     #[inline(always)]
     pub fn placed(&self, object_from_world: &Mat3, translation: Vec3) -> Self {
-        let m = object_from_world.to_cols_array_2d();
-        let mut origin = [[0.0; LANES]; 3];
-        let mut direction = [[0.0; LANES]; 3];
-        for axis in 0..3 {
-            for i in 0..LANES {
-                let [x, y, z] = [0, 1, 2].map(|k: usize| self.origin[k][i] - translation[k]);
-                origin[axis][i] = m[0][axis] * x + m[1][axis] * y + m[2][axis] * z;
-                let [x, y, z] = self.direction.map(|lanes| lanes[i]);
-                direction[axis][i] = m[0][axis] * x + m[1][axis] * y + m[2][axis] * z;
-            }
+        let mut from = self.origin;
+        for (lanes, translation) in from.iter_mut().zip(translation.to_array()) {
+            lanes.iter_mut().for_each(|lane| *lane -= translation);
         }
-        Self::new(origin, direction)
+        Self::new(product(object_from_world, &from), product(object_from_world, &self.direction))
     }
 
     /// Where one of the rays starts.
@@ -101,11 +109,17 @@ impl LaneRays {
         Vec3::from_array(self.origin.each_ref().map(|axis| axis[lane]))
     }
 
+    /// Origin and direction of one of the rays.
+    #[inline]
+    pub fn ray_start(&self, lane: usize) -> RayStart {
+        (self.start(lane), Vec3::from_array(self.direction.each_ref().map(|axis| axis[lane])))
+    }
+
     /// One of the rays, with its grain.
     #[inline]
     pub fn ray(&self, lane: usize, grain: Vec3) -> Ray {
-        let direction = Vec3::from_array(self.direction.each_ref().map(|axis| axis[lane]));
-        Ray { grain, ..Ray::new(self.start(lane), direction) }
+        let (origin, direction) = self.ray_start(lane);
+        Ray { grain, ..Ray::new(origin, direction) }
     }
 
     /// What the triangle test needs; `None` if the rays are no packet.
@@ -270,6 +284,9 @@ pub(super) trait Visit {
     /// At least the largest component of any ray's origin and grain.
     fn size(&self) -> f32;
 
+    /// Whether a ray is taken not to meet a triangle.
+    fn leaves(&self, lane: usize, triangle: u32) -> bool;
+
     /// Takes the hits of one triangle.
     fn hit(&mut self, triangle: u32, hits: &LaneHits);
 }
@@ -278,13 +295,27 @@ pub(super) trait Visit {
 #[inline(always)]
 pub(super) fn intersect(tree: &MeshTree, rays: &LaneRays, shear: &Shear, visit: &mut impl Visit) {
     let mut farthest = largest(visit.reach());
-    tree.tree().walk(&rays.bundle(), &mut farthest, |leaf, farthest| {
+    tree.tree().walk(&rays.bundle(), &mut farthest, InLeaf { tree, rays, shear, visit });
+}
+
+/// Looks at the triangles of leaves.
+struct InLeaf<'a, V> {
+    tree: &'a MeshTree,
+    rays: &'a LaneRays,
+    shear: &'a Shear,
+    visit: &'a mut V,
+}
+
+impl<V: Visit> Visitor for InLeaf<'_, V> {
+    #[inline(always)]
+    fn leaf(&mut self, leaf: Leaf<'_>, farthest: &mut f32) -> bool {
+        let Self { tree, rays, shear, visit } = self;
         let (near, mut limit, any) = rays.enter(&leaf, visit.reach());
         if any {
             for block in tree.blocks(&leaf) {
                 for place in 0..WIDTH {
                     let Some((triangle, vertices)) = block.triangle(place) else { break };
-                    if let Some(hits) = shear.triangle(rays, visit, &vertices, &near, &limit) {
+                    if let Some(hits) = shear.triangle(rays, *visit, (triangle, &vertices), &near, &limit) {
                         visit.hit(triangle, &hits);
                         let reach = visit.reach();
                         for i in 0..LANES {
@@ -296,7 +327,7 @@ pub(super) fn intersect(tree: &MeshTree, rays: &LaneRays, shear: &Shear, visit: 
             *farthest = largest(visit.reach());
         }
         *farthest >= 0.0
-    });
+    }
 }
 
 impl Shear {
@@ -306,7 +337,7 @@ impl Shear {
         &self,
         rays: &LaneRays,
         visit: &impl Visit,
-        vertices: &[Vec3; 3],
+        (id, vertices): (u32, &[Vec3; 3]),
         near: &Lanes,
         limit: &Lanes,
     ) -> Option<LaneHits> {
@@ -367,7 +398,7 @@ impl Shear {
             any |= side;
         }
         if any & LaneHits::SPECIAL != 0 {
-            any = ask(rays, visit, vertices, near, limit, &mut hits);
+            any = ask(rays, visit, (id, vertices), near, limit, &mut hits);
         }
         (any != 0).then_some(hits)
     }
@@ -378,7 +409,7 @@ impl Shear {
 fn ask(
     rays: &LaneRays,
     visit: &impl Visit,
-    vertices: &[Vec3; 3],
+    (id, vertices): (u32, &[Vec3; 3]),
     near: &Lanes,
     limit: &Lanes,
     hits: &mut LaneHits,
@@ -388,6 +419,9 @@ fn ask(
             continue;
         }
         hits.side[i] = LaneHits::NONE;
+        if visit.leaves(i, id) {
+            continue;
+        }
         if let Some(hit) = rays.ray(i, visit.grain(i)).triangle(vertices, limit[i]) {
             let t = hit.t.max(near[i]);
             if t <= limit[i] {

@@ -23,24 +23,29 @@ pub(super) struct TreeNode {
     /// How much of this node's coverage its parent takes over: what shows through a see-through surface, else 0.
     pub alpha_weight: f32,
     /// Letters of the path that are reflections.
-    pub reflections: u32,
+    pub reflections: u8,
     /// Letters of the path that are refractions.
-    pub refractions: u32,
+    pub refractions: u8,
     /// The pixel's cone where the ray starts.
     pub cone: Cone,
     /// Path length from the camera to where the ray starts.
     pub length_before: f32,
-    /// What the line pass will see; `throughput` is set from the start, the rest once a surface is found.
-    pub attributes: Node,
+    /// Product of the weights along the path from the camera.
+    pub throughput: Vec3,
+    /// Which of the run's attributes the line pass will see, or [`Self::MISS`].
+    pub attributes: u32,
     /// Radiance along the ray, without the parent's weight.
     pub radiance: Vec3,
     /// Coverage along the ray.
     pub alpha: f32,
-    /// The shader, as in `attributes`, that is to blame if the radiance is not finite.
+    /// The shader, 1 + its material, that is to blame if the radiance is not finite.
     pub culprit: u32,
 }
 
 impl TreeNode {
+    /// In place of attributes: the ray has met nothing, or nothing yet.
+    pub const MISS: u32 = u32::MAX;
+
     /// The node of a camera ray.
     pub fn root(sample: u32, cone: Cone) -> Self {
         Self {
@@ -54,7 +59,8 @@ impl TreeNode {
             refractions: 0,
             cone,
             length_before: 0.0,
-            attributes: Node::default(),
+            throughput: Vec3::ONE,
+            attributes: Self::MISS,
             radiance: Vec3::ZERO,
             alpha: 1.0,
             culprit: 0,
@@ -103,8 +109,12 @@ pub(super) struct WaveHit {
 /// A run of samples: their trees so far, and the rays that are still to be traced.
 #[derive(Debug, Default)]
 pub(super) struct Run {
+    /// Where in their pixels the camera rays start.
+    pub offsets: Vec<[f32; 2]>,
     /// All nodes; those of the camera come first, children stand after their parents.
     pub nodes: Vec<TreeNode>,
+    /// What the line pass will see of nodes that are no misses.
+    pub attributes: Vec<Node>,
     /// Rays that met something invisible and go on in this wave, for the same node.
     pub again: Vec<WaveRay>,
     /// The next wave.
@@ -129,8 +139,23 @@ impl Run {
     /// Empties the run and keeps its memory.
     pub fn clear(&mut self) {
         // The record is told whether it is wanted.
-        let Self { nodes, again, next, behind, surfaces, media, crossings, positions, aovs, record: _ } = self;
+        let Self {
+            offsets,
+            nodes,
+            attributes,
+            again,
+            next,
+            behind,
+            surfaces,
+            media,
+            crossings,
+            positions,
+            aovs,
+            record: _,
+        } = self;
+        offsets.clear();
         nodes.clear();
+        attributes.clear();
         again.clear();
         next.clear();
         behind.clear();

@@ -7,7 +7,6 @@
 use super::ray_tree::{Run, TreeNode, WaveHit, WaveRay};
 use super::record::TileRecord;
 use super::scatter::Outputs;
-use super::triangle::Ray;
 use super::wave::{RayCounts, TileTracer, TraceContext, Work};
 use crate::clock::CpuClock;
 use crate::plan::LINE_SLICE;
@@ -123,7 +122,7 @@ impl TileTracer<'_> {
                 }
             };
             let ray = WaveRay { origin, direction, node: index as u32, after: None, passed: 0, media: 0, counted: 0 };
-            group.push(self.wave_hit(&ray, &Ray::new(origin, direction), &hit, &node, 0));
+            group.push(self.wave_hit(&ray, &hit, &node, 0));
             run.nodes.push(node);
         }
         Some((run, group))

@@ -229,8 +229,9 @@ impl TileTracer<'_> {
         // What the line pass and the layers need.
         let index = hit.ray.node as usize;
         let node = &mut run.nodes[index];
-        node.attributes = Node { throughput: node.attributes.throughput, ..self.attributes(hit, node.cone, outputs) };
-        node.culprit = node.attributes.shader;
+        node.attributes = run.attributes.len() as u32;
+        run.attributes.push(self.attributes(hit, node.cone, outputs));
+        node.culprit = hit.material.0 + 1;
         node.alpha = if self.transparent { opacity } else { 1.0 };
         if node.path == NodePath::CAMERA {
             if let Some(position) = run.positions.get_mut(index) {
@@ -290,14 +291,14 @@ impl TileTracer<'_> {
             node.alpha = 1.0;
         }
         let node = *node;
-        if node.reflections < self.plan.reflection_depth {
+        if u32::from(node.reflections) < self.plan.reflection_depth {
             let weight = bounces.reflection * opacity;
             let kind = PathKind::Reflection;
             let media = hit.ray.media;
             let mirrored = Departure { kind, direction: mirrored, weight, alpha_weight: 0.0, eta: 1.0, media };
             self.send(hit, &node, mirrored, run);
         }
-        if node.refractions < self.plan.refraction_depth {
+        if u32::from(node.refractions) < self.plan.refraction_depth {
             let direction = if straight { direction } else { bounces.refracted };
             let alpha_weight = 1.0 - node.alpha;
             let weight = refraction + through;
@@ -413,7 +414,7 @@ impl TileTracer<'_> {
     /// Sends a ray on from a hit, unless it could not be seen.
     fn send(&self, hit: &WaveHit, parent: &TreeNode, departure: Departure, run: &mut Run) {
         let Departure { kind, direction, weight, alpha_weight, eta, media } = departure;
-        let throughput = Vec3::from(parent.attributes.throughput) * weight;
+        let throughput = parent.throughput * weight;
         if !throughput.is_finite() || throughput.max_element() < LEAST_THROUGHPUT {
             return;
         }
@@ -427,10 +428,10 @@ impl TileTracer<'_> {
             kind,
             weight,
             alpha_weight,
-            reflections: parent.reflections + u32::from(reflected),
-            refractions: parent.refractions + u32::from(!reflected),
+            reflections: parent.reflections + u8::from(reflected),
+            refractions: parent.refractions + u8::from(!reflected),
             length_before: hit.depth,
-            attributes: Node { throughput: throughput.to_array(), ..Node::default() },
+            throughput,
             ..TreeNode::root(parent.sample, self.departing_cone(hit, parent, reflected, eta))
         });
     }

@@ -3,12 +3,16 @@
 //! Shadow rays go straight on through see-through and transmissive surfaces and lose what those do not let pass; they
 //! are neither bent nor tinted, and reflection at glass takes nothing from them.
 
+use smallvec::SmallVec;
+
+use super::packet::LANES;
 use super::ray_tree::{TreeNode, WaveHit, WaveRay};
 use super::record::{RunRecord, UNKNOWN};
 use super::surface::Surface;
 use super::triangle::Ray;
 use super::wave::{TileTracer, TraceContext, Work, value};
 use super::world::Hit;
+use super::world_packet::{ShadowRay, Way};
 use crate::clock::CpuClock;
 use crate::math::Vec3;
 use crate::scene::ids::MaterialId;
@@ -26,39 +30,41 @@ impl TileTracer<'_> {
         context: &mut TraceContext<'_>,
         work: &mut Work<'_>,
     ) -> Vec<LightSample> {
-        let mut samples = Vec::with_capacity(group.len() * self.lighting.len());
-        let mut passed = Vec::new();
+        let lights = self.lighting.len();
+        let mut samples = vec![LightSample::default(); group.len() * lights];
         let mut see_through = Vec::new();
-        for hit in group {
-            let surface = &hit.surface;
-            let known = match work.known {
-                Some(known) if hit.place == 0 => known.visibility(&nodes[hit.ray.node as usize], &hit.ray, &hit.hit),
-                _ => &[],
-            };
-            for light in 0..self.lighting.len() {
+        for light in 0..lights {
+            // Rays towards one light that start side by side go much the same way.
+            let mut waiting: SmallVec<[(usize, ShadowRay); LANES]> = SmallVec::new();
+            for (index, hit) in group.iter().enumerate() {
+                let surface = &hit.surface;
+                let place = index * lights + light;
                 let (mut sample, distance) = self.lighting.sample(light, surface.position);
-                let known = known.get(light).copied().filter(|visibility| *visibility != UNKNOWN);
-                if let Some(visibility) = known {
+                let known = match work.known {
+                    Some(known) if hit.place == 0 => {
+                        known.visibility(&nodes[hit.ray.node as usize], &hit.ray, &hit.hit).get(light).copied()
+                    }
+                    _ => None,
+                };
+                if let Some(visibility) = known.filter(|visibility| *visibility != UNKNOWN) {
                     sample.visibility = visibility;
                 } else if sample.direction.dot(surface.geometric_normal) <= 0.0 {
                     // In its own shadow.
                     sample.visibility = 0.0;
                 } else if self.lighting.casts_shadows(light) && sample.radiance != Vec3::ZERO {
                     work.rays.shadow += 1;
-                    let origin = surface.leave(sample.direction);
-                    let ray = Ray::new(origin, sample.direction);
-                    let opaque = |id: MaterialId| self.plan.materials[id.index()].blocks_light();
+                    let start = (surface.leave(sample.direction), sample.direction);
                     // The light itself is no obstacle.
                     let reach = distance * (1.0 - 1e-5);
-                    if self.world.blocked(&ray, reach, opaque, &mut passed) {
-                        sample.visibility = 0.0;
-                    }
-                    if sample.visibility > 0.0 {
-                        see_through.extend(passed.iter().map(|hit| (samples.len(), ray, *hit)));
-                    }
+                    waiting.push((place, ShadowRay { start, reach, leaves: hit.hit.facet() }));
                 }
-                samples.push(sample);
+                samples[place] = sample;
+                if waiting.len() == LANES {
+                    self.cast(&waiting, &mut samples, &mut see_through);
+                    waiting.clear();
+                }
             }
+            self.cast(&waiting, &mut samples, &mut see_through);
         }
         if !see_through.is_empty() {
             self.attenuate(&see_through, &mut samples, context, work);
@@ -71,6 +77,28 @@ impl TileTracer<'_> {
             }
         }
         samples
+    }
+
+    /// Sends rays towards a light, each for the light sample of a number: what is surely blocked becomes invisible, and what
+    /// see-through surfaces are passed is noted.
+    fn cast(&self, rays: &[(usize, ShadowRay)], samples: &mut [LightSample], see_through: &mut Vec<(usize, Ray, Hit)>) {
+        let opaque = |id: MaterialId| self.plan.materials[id.index()].blocks_light();
+        let packet: SmallVec<[ShadowRay; LANES]> = rays.iter().map(|(_, ray)| *ray).collect();
+        let mut passed = Vec::new();
+        for (&(place, ShadowRay { start, reach, leaves }), way) in
+            rays.iter().zip(self.world.blocked_of(&packet, &opaque))
+        {
+            let blocked = way == Way::Blocked
+                || way == Way::Unknown && {
+                    let ray = Ray::new(start.0, start.1);
+                    let blocked = self.world.blocked(&ray, reach, Some(leaves), opaque, &mut passed);
+                    see_through.extend(passed.iter().filter(|_| !blocked).map(|hit| (place, ray, *hit)));
+                    blocked
+                };
+            if blocked {
+                samples[place].visibility = 0.0;
+            }
+        }
     }
 
     /// Lowers the visibility of light samples by what see-through surfaces on the way let pass: asks their shaders for
@@ -87,7 +115,7 @@ impl TileTracer<'_> {
             .map(|(sample, ray, hit)| {
                 let (origin, direction) = (ray.origin, ray.direction);
                 let wave_ray = WaveRay { origin, direction, node: 0, after: None, passed: 0, media: 0, counted: 0 };
-                let surface = Surface::new(self.world, ray, hit);
+                let surface = Surface::new(self.world, ray.direction, hit);
                 let material = self.world.material(hit);
                 let hit =
                     WaveHit { ray: wave_ray, hit: *hit, surface, material, depth: hit.t, place: 0, crossing: None };

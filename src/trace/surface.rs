@@ -1,7 +1,6 @@
 //! From a hit to the surface there: place, error bounds, normals and vertex attributes.
 
 use super::gamma;
-use super::triangle::Ray;
 use super::world::{Hit, PlacedObject, World};
 use crate::math::{Vec2, Vec3, Vec4};
 
@@ -26,9 +25,9 @@ pub struct Surface {
 }
 
 impl Surface {
-    /// The surface where `ray` met `hit`.
+    /// The surface at `hit`, which a ray in `direction` met.
     #[must_use]
-    pub fn new(world: &World, ray: &Ray, hit: &Hit) -> Self {
+    pub fn new(world: &World, direction: Vec3, hit: &Hit) -> Self {
         let object = world.object(hit.object);
         let mesh = &object.mesh;
         let corners = mesh.triangles[hit.triangle as usize];
@@ -48,7 +47,7 @@ impl Surface {
         let flip = if hit.front { 1.0 } else { -1.0 };
         let geometric_normal = triangle_normal(object, [a, b, c]);
         // Too thin to have a normal in single precision: any normal towards the ray will do.
-        let geometric_normal = geometric_normal.map_or_else(|| -ray.direction.normalize_or_zero(), |n| n * flip);
+        let geometric_normal = geometric_normal.map_or_else(|| -direction.normalize_or_zero(), |n| n * flip);
         let normal = shading_normal(object, corners, barycentric)
             .map(|normal| normal * flip)
             // A shading normal on the far side of the triangle (smoothed over a sharp edge) would light the wrong side.

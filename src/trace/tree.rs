@@ -94,6 +94,20 @@ pub trait Slabs {
     fn distances(&self, planes: &[Vec4; 6]) -> (Vec4, Vec4);
 }
 
+/// Looks into leaves. A closure does; packets have types of their own, because what runs under wider instructions has to be
+/// inlined, which no closure can be made to be.
+pub trait Visitor {
+    /// Looks into a leaf that is entered within `t_max`, which it may lower; returns whether to go on.
+    fn leaf(&mut self, leaf: Leaf<'_>, t_max: &mut f32) -> bool;
+}
+
+impl<F: FnMut(Leaf<'_>, &mut f32) -> bool> Visitor for F {
+    #[inline(always)]
+    fn leaf(&mut self, leaf: Leaf<'_>, t_max: &mut f32) -> bool {
+        self(leaf, t_max)
+    }
+}
+
 /// A ray as the box test sees it.
 struct RaySlabs {
     origin: [Vec4; 3],
@@ -190,7 +204,7 @@ impl BoxTree {
 
     /// The same for anything that has slab distances, none of which may be NaN.
     #[inline(always)]
-    pub fn walk(&self, slabs: &impl Slabs, t_max: &mut f32, mut visit: impl FnMut(Leaf<'_>, &mut f32) -> bool) {
+    pub fn walk(&self, slabs: &impl Slabs, t_max: &mut f32, mut visit: impl Visitor) {
         if self.nodes.is_empty() {
             return;
         }
@@ -257,7 +271,7 @@ impl BoxTree {
                 if places.1 == 0 {
                     break places.0 as usize;
                 }
-                if !visit(Leaf { places, near, node, child }, t_max) {
+                if !visit.leaf(Leaf { places, near, node, child }, t_max) {
                     return;
                 }
             };

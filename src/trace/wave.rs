@@ -22,7 +22,7 @@ use crate::clock::CpuClock;
 use crate::math::Vec3;
 use crate::plan::{Plan, marker};
 use crate::sample::position::SamplePositions;
-use crate::sample::{PairBatch, PixelRect, SampleBuffer, SampleBufferBuilder, SampleColor};
+use crate::sample::{Node, NodePath, PairBatch, PixelRect, SampleBuffer, SampleBufferBuilder, SampleColor};
 use crate::scene::Scene;
 use crate::scene::camera::CameraRays;
 use crate::scene::ids::{MaterialId, ObjectId};
@@ -108,6 +108,7 @@ pub struct TraceContext<'a> {
     pub(super) constants: Vec<Option<OutputBatch>>,
     pub(super) hits: HitBatch,
     pub(super) outputs: OutputBatch,
+    wave_hits: Vec<WaveHit>,
     run: Run,
 }
 
@@ -121,6 +122,7 @@ impl<'a> TraceContext<'a> {
             constants: vec![None; scene.materials().len()],
             hits: HitBatch::default(),
             outputs: OutputBatch::default(),
+            wave_hits: Vec::new(),
             run: Run::default(),
         }
     }
@@ -195,9 +197,16 @@ impl<'a> TileTracer<'a> {
         let mut run = std::mem::take(&mut context.run);
         run.clear();
         run.record.clear(record.is_some(), self.lighting.len());
-        let offsets = self.start(rect, pixels, &mut run);
-        if !self.plan.bodies.is_empty() {
-            self.start_in_media(&mut run, context, work);
+        let count = pixels.len() * self.plan.layout.samples_per_pixel as usize;
+        run.positions.resize(if self.plan.layout.position { count } else { 0 }, Vec3::ZERO);
+        run.aovs.resize(count * self.plan.layout.aovs, Vec3::ZERO);
+        if self.camera_rays_are_plain(work) {
+            self.run_camera_wave(rect, pixels, &mut run, context, work);
+        } else {
+            self.start(rect, pixels, &mut run);
+            if !self.plan.bodies.is_empty() {
+                self.start_in_media(&mut run, context, work);
+            }
         }
         while !run.next.is_empty() {
             let wave = std::mem::take(&mut run.next);
@@ -205,33 +214,37 @@ impl<'a> TileTracer<'a> {
         }
         run.gather_radiance();
         run.surfaces.sort_by_key(|&(node, place, _)| (place, node));
-        self.store(&run, &offsets, samples);
+        self.store(&run, samples);
         if let Some(record) = record {
             record.add(&run);
         }
         context.run = run;
     }
 
-    /// Makes the camera rays of a run of pixels the next wave; returns where in their pixels they start.
-    fn start(&self, rect: PixelRect, pixels: Range<usize>, run: &mut Run) -> Vec<[f32; 2]> {
-        let per_pixel = self.plan.layout.samples_per_pixel;
-        let count = pixels.len() * per_pixel as usize;
-        let mut offsets = Vec::with_capacity(count);
-        for index in pixels {
-            let width = rect.width() as usize;
-            let pixel = [rect.x0 + (index % width) as i32, rect.y0 + (index / width) as i32];
-            for sample in 0..per_pixel {
-                let offset = self.positions.offset(pixel, sample);
-                let (origin, direction) = self.rays.ray(pixel, offset);
-                let node = run.nodes.len() as u32;
-                run.next.push(WaveRay { origin, direction, node, after: None, passed: 0, media: 0, counted: 0 });
-                run.nodes.push(TreeNode::root(index as u32 * per_pixel + sample, self.cone));
-                offsets.push(offset);
-            }
+    /// Makes the camera rays of a run of pixels the next wave.
+    fn start(&self, rect: PixelRect, pixels: Range<usize>, run: &mut Run) {
+        for (sample, pixel, offset) in self.film_places(rect, pixels) {
+            let (origin, direction) = self.rays.ray(pixel, offset);
+            let node = run.nodes.len() as u32;
+            run.next.push(WaveRay { origin, direction, node, after: None, passed: 0, media: 0, counted: 0 });
+            run.nodes.push(TreeNode::root(sample, self.cone));
+            run.offsets.push(offset);
         }
-        run.positions.resize(if self.plan.layout.position { count } else { 0 }, Vec3::ZERO);
-        run.aovs.resize(count * self.plan.layout.aovs, Vec3::ZERO);
-        offsets
+    }
+
+    /// The samples of a run of pixels: number in the tile, pixel, and place in the pixel.
+    pub(super) fn film_places(
+        &self,
+        rect: PixelRect,
+        pixels: Range<usize>,
+    ) -> impl Iterator<Item = (u32, [i32; 2], [f32; 2])> {
+        let per_pixel = self.plan.layout.samples_per_pixel;
+        let width = rect.width() as usize;
+        pixels.flat_map(move |index| {
+            let pixel = [rect.x0 + (index % width) as i32, rect.y0 + (index / width) as i32];
+            let place = move |sample| (index as u32 * per_pixel + sample, pixel, self.positions.offset(pixel, sample));
+            (0..per_pixel).map(place)
+        })
     }
 
     /// Traces and shades one wave; what it mirrors and refracts becomes the next.
@@ -240,17 +253,80 @@ impl<'a> TileTracer<'a> {
         while !wave.is_empty() {
             let mut hits = self.find_hits(&wave, run, work);
             wave.clear();
-            // Stable, so that rays stay in the order of their samples within a material.
-            hits.sort_by_key(|hit| hit.material);
-            for group in hits.chunk_by(|a, b| a.material == b.material) {
-                self.shade_group(group, run, context, work);
-            }
+            self.shade_hits(&mut hits, run, context, work);
             run.forget_behind_again();
             std::mem::swap(&mut wave, &mut run.again);
         }
         if !run.behind.is_empty() {
             self.shade_behind(run, context, work);
         }
+    }
+
+    /// Shades the hits of a wave, material by material.
+    fn shade_hits(&self, hits: &mut [WaveHit], run: &mut Run, context: &mut TraceContext<'_>, work: &mut Work<'_>) {
+        // Stable, so that rays stay in the order of their samples within a material.
+        hits.sort_by_key(|hit| hit.material);
+        for group in hits.chunk_by(|a, b| a.material == b.material) {
+            self.shade_group(group, run, context, work);
+        }
+    }
+
+    /// Whether camera rays are asked for no more than their closest hits, none of which is known.
+    fn camera_rays_are_plain(&self, work: &Work<'_>) -> bool {
+        work.known.is_none() && self.plan.bodies.is_empty() && !self.keeps_list(NodePath::CAMERA)
+    }
+
+    /// Wave 0 where camera rays are plain: in packets from the film to what they meet. What misses everything is done at once.
+    fn run_camera_wave(
+        &self,
+        rect: PixelRect,
+        pixels: Range<usize>,
+        run: &mut Run,
+        context: &mut TraceContext<'_>,
+        work: &mut Work<'_>,
+    ) {
+        let mut places = self.film_places(rect, pixels);
+        let mut hits = std::mem::take(&mut context.wave_hits);
+        loop {
+            let (mut samples, mut film) = ([0; LANES], [([0; 2], [0.0; 2]); LANES]);
+            let mut count = 0;
+            for (sample, pixel, offset) in places.by_ref().take(LANES) {
+                samples[count] = sample;
+                film[count] = (pixel, offset);
+                count += 1;
+            }
+            if count == 0 {
+                break;
+            }
+            let last = film[count - 1];
+            film[count..].fill(last);
+            let (rays, met) = self.world.closest_of_camera(&self.rays, &film, count);
+            work.rays.camera += count as u64;
+            for lane in 0..count {
+                let node = run.nodes.len() as u32;
+                let (origin, direction) = rays.ray_start(lane);
+                let ray = WaveRay { origin, direction, node, after: None, passed: 0, media: 0, counted: 0 };
+                run.record.note(&ray, met[lane].as_ref());
+                let mut root = TreeNode::root(samples[lane], self.cone);
+                match met[lane] {
+                    Some(hit) => hits.push(self.wave_hit(&ray, &hit, &root, 0)),
+                    None => self.miss(&mut root, direction),
+                }
+                run.nodes.push(root);
+                run.offsets.push(film[lane].1);
+            }
+        }
+        self.shade_hits(&mut hits, run, context, work);
+        hits.clear();
+        context.wave_hits = hits;
+        let again = std::mem::take(&mut run.again);
+        self.run_wave(again, run, context, work);
+    }
+
+    /// A node whose ray leaves the scene.
+    fn miss(&self, node: &mut TreeNode, direction: Vec3) {
+        node.radiance = self.lighting.background(direction);
+        node.alpha = if self.transparent { 0.0 } else { 1.0 };
     }
 
     fn find_hits(&self, wave: &[WaveRay], run: &mut Run, work: &mut Work<'_>) -> Vec<WaveHit> {
@@ -291,15 +367,14 @@ impl<'a> TileTracer<'a> {
             };
             record.note(&from, seen.as_ref().map(|seen| &seen.hit));
             let Some(Seen { hit, error, crossing }) = seen else {
-                node.radiance = self.lighting.background(from.direction);
-                node.alpha = if self.transparent { 0.0 } else { 1.0 };
+                self.miss(node, from.direction);
                 continue;
             };
             // What else is at the place of a crossing is seen through it.
             let is_behind = |other: &&Hit| other.facet() != hit.facet() && (crossing.is_none() || other.t > hit.t);
             let behind_it = list.iter().filter(is_behind).zip(1..);
-            behind.extend(behind_it.map(|(hit, place)| self.wave_hit(&from, &ray, hit, node, place)));
-            let mut hit = self.wave_hit(&from, &ray, &hit, node, 0);
+            behind.extend(behind_it.map(|(hit, place)| self.wave_hit(&from, hit, node, place)));
+            let mut hit = self.wave_hit(&from, &hit, node, 0);
             hit.surface.error = hit.surface.error.max(error);
             if let Some(crossing) = crossing {
                 hit.crossing = Some(crossings.len() as u32);
@@ -332,11 +407,11 @@ impl<'a> TileTracer<'a> {
 
     /// A hit on its way to be shaded.
     #[inline]
-    pub(super) fn wave_hit(&self, from: &WaveRay, ray: &Ray, hit: &Hit, node: &TreeNode, place: usize) -> WaveHit {
+    pub(super) fn wave_hit(&self, from: &WaveRay, hit: &Hit, node: &TreeNode, place: usize) -> WaveHit {
         WaveHit {
             ray: *from,
             hit: *hit,
-            surface: Surface::new(self.world, ray, hit),
+            surface: Surface::new(self.world, from.direction, hit),
             material: self.world.material(hit),
             depth: node.length_before + hit.t,
             place: place as u32,
@@ -345,14 +420,16 @@ impl<'a> TileTracer<'a> {
     }
 
     /// Hands the nodes of a run to the sample buffer.
-    fn store(&self, run: &Run, offsets: &[[f32; 2]], samples: &mut SampleBufferBuilder) {
+    fn store(&self, run: &Run, samples: &mut SampleBufferBuilder) {
         let layout = &self.plan.layout;
-        let mut extras = Vec::with_capacity(layout.aovs);
-        for (root, offset) in offsets.iter().enumerate() {
-            let node = &run.nodes[root];
+        let roots = &run.nodes[..run.offsets.len()];
+        for (node, offset) in roots.iter().zip(&run.offsets) {
             let color = SampleColor { color: node.radiance.to_array(), alpha: node.alpha };
             samples.set_sample(node.sample, *offset, color, node.culprit);
-            if layout.position || layout.aovs > 0 {
+        }
+        if layout.position || layout.aovs > 0 {
+            let mut extras = Vec::with_capacity(layout.aovs);
+            for (root, node) in roots.iter().enumerate() {
                 let position = run.positions.get(root).copied().unwrap_or_default();
                 extras.clear();
                 extras.extend(run.aovs[root * layout.aovs..(root + 1) * layout.aovs].iter().map(|aov| aov.to_array()));
@@ -360,16 +437,28 @@ impl<'a> TileTracer<'a> {
             }
         }
         // Without a line pass nobody asks what mirrors and glass show.
-        let kept = if self.plan.lines.is_some() { run.nodes.len() } else { offsets.len() };
-        for node in &run.nodes[..kept] {
-            let mut attributes = node.attributes;
-            attributes.contribution = (Vec3::from(attributes.throughput) * node.radiance).to_array();
-            samples.push(node.path, node.sample, attributes);
+        let kept = if self.plan.lines.is_some() { run.nodes.len() } else { roots.len() };
+        let (roots, others) = run.nodes[..kept].split_at(roots.len());
+        let is_plain_miss = |node: &TreeNode| node.attributes == TreeNode::MISS && !layout.columns.contribution;
+        for nodes in roots.chunk_by(|a, b| is_plain_miss(a) && is_plain_miss(b)) {
+            let (first, last) = (nodes[0].sample, nodes[nodes.len() - 1].sample);
+            samples.push_same(NodePath::CAMERA, first..=last, self.attributes_of(run, &nodes[0]));
+        }
+        for node in others {
+            samples.push(node.path, node.sample, self.attributes_of(run, node));
         }
         for &(node, place, attributes) in &run.surfaces {
             let node = &run.nodes[node as usize];
             samples.push_behind(node.path, place as usize, node.sample, attributes);
         }
+    }
+
+    /// What the line pass sees of a node.
+    #[inline]
+    fn attributes_of(&self, run: &Run, node: &TreeNode) -> Node {
+        let attributes = run.attributes.get(node.attributes as usize).copied().unwrap_or_default();
+        let contribution = (node.throughput * node.radiance).to_array();
+        Node { throughput: node.throughput.to_array(), contribution, ..attributes }
     }
 }
 

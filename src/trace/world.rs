@@ -188,12 +188,22 @@ impl World {
 
     /// Looks for something that blocks a shadow ray within `t_max`. `opaque` tells of a material whether it surely
     /// blocks; hits on others are collected in `passed`, nearest first. Returns whether the ray is surely blocked
-    /// (`passed` is then incomplete).
+    /// (`passed` is then incomplete). The triangle that it `leaves` is not met.
     #[must_use]
-    pub fn blocked(&self, ray: &Ray, t_max: f32, opaque: impl Fn(MaterialId) -> bool, passed: &mut Vec<Hit>) -> bool {
+    pub fn blocked(
+        &self,
+        ray: &Ray,
+        t_max: f32,
+        leaves: Option<Facet>,
+        opaque: impl Fn(MaterialId) -> bool,
+        passed: &mut Vec<Hit>,
+    ) -> bool {
         passed.clear();
         let mut blocked = false;
         self.each_hit(ray, RayKinds::SHADOW, t_max, |hit, _, _| {
+            if leaves == Some(hit.facet()) {
+                return true;
+            }
             blocked = opaque(self.material(&hit));
             if !blocked {
                 passed.push(hit);

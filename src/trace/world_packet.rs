@@ -1,13 +1,15 @@
-//! Packets of rays through the world. What they find is what [`World::closest`] finds of each ray, bit for bit.
-//!
-//! Shadow rays do not go in packets: those stop later than single rays, which end at the first thing they meet, and were
-//! measured three times as slow (`tests/bench/README.md`).
+//! Packets of rays through the world. What they find is what [`World::closest`] and [`World::blocked`] find of each ray, bit for
+//! bit.
 
 use super::packet::{self, DONE, LANES, LaneHits, LaneRays, Lanes, RayStart, Visit, intersect, largest};
+use super::tree::{Leaf, Visitor};
 use super::triangle::Ray;
-use super::world::{Hit, PlacedObject, World};
+use smallvec::SmallVec;
+
+use super::world::{Facet, Hit, PlacedObject, World};
 use crate::math::Vec3;
-use crate::scene::ids::ObjectId;
+use crate::scene::camera::CameraRays;
+use crate::scene::ids::{MaterialId, ObjectId};
 use crate::scene::settings::RayKinds;
 
 /// Fewer rays are traced one by one.
@@ -18,28 +20,77 @@ impl World {
     /// rays go much the same way.
     #[must_use]
     pub fn closest_of(&self, rays: &[RayStart], kind: RayKinds) -> [Option<Hit>; LANES] {
+        match LaneRays::of(rays) {
+            Some(packet) => self.closest_of_lanes(&packet, rays.len().min(LANES), kind),
+            None => [None; LANES],
+        }
+    }
+
+    /// The rays of a camera through film positions (pixels, and places in them), and the closest hits of the first of them.
+    pub(super) fn closest_of_camera(
+        &self,
+        camera: &CameraRays,
+        film: &[([i32; 2], [f32; 2]); LANES],
+        count: usize,
+    ) -> (LaneRays, [Option<Hit>; LANES]) {
+        let rays = self.arch.dispatch(FromCamera { camera, film });
+        (rays, self.closest_of_lanes(&rays, count, RayKinds::CAMERA))
+    }
+
+    /// What is in the way of at most [`LANES`] shadow rays, as [`Self::blocked`] finds it one by one.
+    #[must_use]
+    pub fn blocked_of(&self, rays: &[ShadowRay], opaque: &impl Fn(MaterialId) -> bool) -> [Way; LANES] {
+        let mut ways = [Way::Unknown; LANES];
+        let starts: SmallVec<[RayStart; LANES]> = rays.iter().map(|ray| ray.start).collect();
+        if rays.len() < FEWEST {
+            return ways;
+        }
+        let Some(packet) = LaneRays::of(&starts) else { return ways };
+        let mut reach = [DONE; LANES];
+        reach.iter_mut().zip(rays).for_each(|(reach, ray)| *reach = ray.reach);
+        let search = Blocked { world: self, rays: &packet, shadow: rays, opaque, reach };
+        if let Some(found) = self.arch.dispatch(search) {
+            ways = found;
+        }
+        ways
+    }
+
+    fn closest_of_lanes(&self, rays: &LaneRays, count: usize, kind: RayKinds) -> [Option<Hit>; LANES] {
         let mut hits = [None; LANES];
-        let packet = if rays.len() < FEWEST { None } else { LaneRays::of(rays) };
-        let traced = packet.and_then(|packet| {
-            let found = Found::new(rays.len());
-            self.arch.dispatch(Closest { world: self, rays: &packet, kind, found })
-        });
+        let one = |lane: usize| {
+            let (origin, direction) = rays.ray_start(lane);
+            self.closest(&Ray::new(origin, direction), kind, f32::INFINITY)
+        };
+        let traced = (count >= FEWEST)
+            .then(|| self.arch.dispatch(Closest { world: self, rays, kind, found: Found::new(count) }))
+            .flatten();
         match traced {
+            // Most packets of the background meet nothing at all.
+            Some(found) if found.object == [Found::NONE; LANES] => {}
             Some(found) => {
-                for (lane, (hit, &(origin, direction))) in hits.iter_mut().zip(rays).enumerate() {
-                    *hit = match found.crowded[lane] {
-                        0 => found.hit(lane),
-                        _ => self.closest(&Ray::new(origin, direction), kind, f32::INFINITY),
-                    };
+                for (lane, hit) in hits[..count].iter_mut().enumerate() {
+                    *hit = if found.crowded[lane] == 0 { found.hit(lane) } else { one(lane) };
                 }
             }
-            None => {
-                for (hit, &(origin, direction)) in hits.iter_mut().zip(rays) {
-                    *hit = self.closest(&Ray::new(origin, direction), kind, f32::INFINITY);
-                }
-            }
+            None => hits[..count].iter_mut().enumerate().for_each(|(lane, hit)| *hit = one(lane)),
         }
         hits
+    }
+}
+
+/// Makes the rays of a camera.
+struct FromCamera<'a> {
+    camera: &'a CameraRays,
+    film: &'a [([i32; 2], [f32; 2]); LANES],
+}
+
+impl pulp::WithSimd for FromCamera<'_> {
+    type Output = LaneRays;
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) -> Self::Output {
+        let (origin, direction) = self.camera.rays(self.film);
+        LaneRays::new(origin, direction)
     }
 }
 
@@ -106,35 +157,50 @@ impl Found {
     }
 }
 
-/// Shows each object that rays of a packet may meet to `each`: its id, the rays in its space, where its box is entered, and
-/// how far rays reach in it. `each` gets and changes what is found, whose reach `reach` tells. `None` if the rays are no packet.
+/// Looks for something in the objects that rays of a packet may meet.
+trait Search {
+    /// How far each ray reaches now.
+    fn reach(&self) -> &Lanes;
+
+    /// Looks at an object of a number: with the rays in its space, where they enter its box, and how far they reach in it.
+    fn object(&mut self, id: u32, object: &PlacedObject, placed: &LaneRays, near: &Lanes, limit: Lanes);
+}
+
+/// Shows each object that rays of a packet may meet to `search`. `None` if the rays are no packet.
 #[inline(always)]
-fn each_object<F>(
-    world: &World,
-    rays: &LaneRays,
-    kind: RayKinds,
-    found: &mut F,
-    reach: impl Fn(&F) -> &Lanes,
-    mut each: impl FnMut(&mut F, u32, &PlacedObject, &LaneRays, &Lanes, Lanes),
-) -> Option<()> {
+fn each_object(world: &World, rays: &LaneRays, kind: RayKinds, search: &mut impl Search) -> Option<()> {
     rays.shear()?;
-    let mut farthest = largest(reach(found));
-    world.tree.walk(&rays.bundle(), &mut farthest, |leaf, farthest| {
-        let (near, _, any) = rays.enter(&leaf, reach(found));
+    let mut farthest = largest(search.reach());
+    world.tree.walk(&rays.bundle(), &mut farthest, Objects { world, rays, kind, search });
+    Some(())
+}
+
+/// Looks at the objects of leaves.
+struct Objects<'a, S> {
+    world: &'a World,
+    rays: &'a LaneRays,
+    kind: RayKinds,
+    search: &'a mut S,
+}
+
+impl<S: Search> Visitor for Objects<'_, S> {
+    #[inline(always)]
+    fn leaf(&mut self, leaf: Leaf<'_>, farthest: &mut f32) -> bool {
+        let Self { world, rays, kind, search } = self;
+        let (near, _, any) = rays.enter(&leaf, search.reach());
         if any {
             for id in &world.tree.order[leaf.range()] {
                 let object = &world.objects[*id as usize];
-                if object.visible_to.contains(kind) {
-                    let (_, limit, _) = rays.enter(&leaf, reach(found));
+                if object.visible_to.contains(*kind) {
+                    let (_, limit, _) = rays.enter(&leaf, search.reach());
                     let placed = rays.placed(&object.object_from_world, object.translation);
-                    each(found, *id, object, &placed, &near, limit);
+                    search.object(*id, object, &placed, &near, limit);
                 }
             }
-            *farthest = largest(reach(found));
+            *farthest = largest(search.reach());
         }
         *farthest >= 0.0
-    });
-    Some(())
+    }
 }
 
 /// The largest component of any ray's origin.
@@ -148,6 +214,33 @@ struct Closest<'a> {
     rays: &'a LaneRays,
     kind: RayKinds,
     found: Found,
+}
+
+/// Looks for the nearest hits.
+struct Nearest<'a> {
+    rays: &'a LaneRays,
+    culls: bool,
+    /// The largest component of any ray's origin.
+    farthest: f32,
+    found: Found,
+}
+
+impl Search for Nearest<'_> {
+    #[inline(always)]
+    fn reach(&self) -> &Lanes {
+        &self.found.reach
+    }
+
+    #[inline(always)]
+    fn object(&mut self, id: u32, object: &PlacedObject, placed: &LaneRays, near: &Lanes, reach: Lanes) {
+        let size = largest_start(placed).max(object.grain(Vec3::splat(self.farthest)).max_element());
+        let (rays, culls, found) = (self.rays, self.culls, &mut self.found);
+        let mut search = InObject { found, id, object, rays, size, culls, near, reach };
+        match placed.shear() {
+            Some(shear) => intersect(&object.tree, placed, &shear, &mut search),
+            None => packet::one_by_one(&object.tree, placed, &mut search),
+        }
+    }
 }
 
 /// Looks for the nearest hits in one object.
@@ -179,6 +272,11 @@ impl Visit for InObject<'_> {
     }
 
     #[inline(always)]
+    fn leaves(&self, _: usize, _: u32) -> bool {
+        false
+    }
+
+    #[inline(always)]
     fn hit(&mut self, triangle: u32, hits: &LaneHits) {
         let single_sided = self.culls && self.object.single_sided[self.object.slot(triangle)];
         self.found.take(hits, self.near, self.id, triangle, single_sided);
@@ -193,24 +291,128 @@ impl pulp::WithSimd for Closest<'_> {
 
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) -> Self::Output {
-        let Self { world, rays, kind, mut found } = self;
+        let Self { world, rays, kind, found } = self;
         let culls = kind != RayKinds::SHADOW;
+        let mut search = Nearest { rays, culls, farthest: largest_start(rays), found };
+        each_object(world, rays, kind, &mut search)?;
+        Some(search.found)
+    }
+}
+
+/// A ray towards a light.
+#[derive(Clone, Copy, Debug)]
+pub struct ShadowRay {
+    /// Origin and direction.
+    pub start: RayStart,
+    /// How far the light is, in lengths of the direction.
+    pub reach: f32,
+    /// The triangle that it leaves, which it does not meet.
+    pub leaves: Facet,
+}
+
+/// What a packet knows of a shadow ray's way.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Way {
+    /// Nothing is in it.
+    Clear,
+    /// Something opaque is.
+    Blocked,
+    /// Nothing opaque is, but other things may be; or nobody looked.
+    Unknown,
+}
+
+struct Blocked<'a, O> {
+    world: &'a World,
+    rays: &'a LaneRays,
+    shadow: &'a [ShadowRay],
+    opaque: &'a O,
+    reach: Lanes,
+}
+
+/// Looks for anything in the way.
+struct Ways<'a, O> {
+    rays: &'a LaneRays,
+    shadow: &'a [ShadowRay],
+    opaque: &'a O,
+    /// The largest component of any ray's origin.
+    farthest: f32,
+    /// How far rays reach that nothing has blocked yet.
+    reach: Lanes,
+    ways: [Way; LANES],
+}
+
+impl<O: Fn(MaterialId) -> bool> Search for Ways<'_, O> {
+    #[inline(always)]
+    fn reach(&self) -> &Lanes {
+        &self.reach
+    }
+
+    #[inline(always)]
+    fn object(&mut self, id: u32, object: &PlacedObject, placed: &LaneRays, _: &Lanes, reach: Lanes) {
+        let size = largest_start(placed).max(object.grain(Vec3::splat(self.farthest)).max_element());
+        let mut search = AnyInObject { id, object, size, reach, found: self };
+        match placed.shear() {
+            Some(shear) => intersect(&object.tree, placed, &shear, &mut search),
+            None => packet::one_by_one(&object.tree, placed, &mut search),
+        }
+    }
+}
+
+/// Looks for anything in one object.
+struct AnyInObject<'a, 'w, O> {
+    found: &'a mut Ways<'w, O>,
+    id: u32,
+    object: &'a PlacedObject,
+    size: f32,
+    reach: Lanes,
+}
+
+impl<O: Fn(MaterialId) -> bool> Visit for AnyInObject<'_, '_, O> {
+    #[inline(always)]
+    fn reach(&self) -> &Lanes {
+        &self.reach
+    }
+
+    #[inline]
+    fn grain(&self, lane: usize) -> Vec3 {
+        self.object.grain(self.found.rays.start(lane))
+    }
+
+    #[inline(always)]
+    fn size(&self) -> f32 {
+        self.size
+    }
+
+    #[inline(always)]
+    fn leaves(&self, lane: usize, triangle: u32) -> bool {
+        self.found.shadow.get(lane).is_some_and(|ray| ray.leaves == (ObjectId(self.id), triangle))
+    }
+
+    #[inline(always)]
+    fn hit(&mut self, triangle: u32, hits: &LaneHits) {
+        let opaque = (self.found.opaque)(self.object.materials[self.object.slot(triangle)]);
+        for lane in 0..LANES {
+            if hits.side[lane] == LaneHits::NONE || self.leaves(lane, triangle) {
+                continue;
+            }
+            self.found.ways[lane] = if opaque { Way::Blocked } else { Way::Unknown };
+            if opaque {
+                self.found.reach[lane] = DONE;
+                self.reach[lane] = DONE;
+            }
+        }
+    }
+}
+
+impl<O: Fn(MaterialId) -> bool> pulp::WithSimd for Blocked<'_, O> {
+    type Output = Option<[Way; LANES]>;
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) -> Self::Output {
+        let Self { world, rays, shadow, opaque, reach } = self;
         let farthest = largest_start(rays);
-        each_object(
-            world,
-            rays,
-            kind,
-            &mut found,
-            |found| &found.reach,
-            |found, id, object, placed, near, limit| {
-                let size = largest_start(placed).max(object.grain(Vec3::splat(farthest)).max_element());
-                let mut search = InObject { found, id, object, rays, size, culls, near, reach: limit };
-                match placed.shear() {
-                    Some(shear) => intersect(&object.tree, placed, &shear, &mut search),
-                    None => packet::one_by_one(&object.tree, placed, &mut search),
-                }
-            },
-        )?;
-        Some(found)
+        let mut search = Ways { rays, shadow, opaque, farthest, reach, ways: [Way::Clear; LANES] };
+        each_object(world, rays, RayKinds::SHADOW, &mut search)?;
+        Some(search.ways)
     }
 }

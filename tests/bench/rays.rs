@@ -16,12 +16,14 @@ use rayon::prelude::*;
 use tusche::clock::CpuClock;
 use tusche::files::FileStore;
 use tusche::math::Vec3;
+use tusche::scene::ids::ObjectId;
 use tusche::scene::settings::RayKinds;
 use tusche::scene::{Scene, file};
 use tusche::trace::World;
 use tusche::trace::packet::{LANES, RayStart};
 use tusche::trace::surface::Surface;
 use tusche::trace::triangle::Ray;
+use tusche::trace::world_packet::{ShadowRay, Way};
 
 const SIZE: [u32; 2] = [1280, 720];
 /// Side of the blocks of pixels in which rays are ordered.
@@ -82,7 +84,7 @@ fn measure(name: &str, scene: &Scene) {
         .filter_map(|&(origin, direction)| {
             let ray = Ray::new(origin, direction);
             let hit = world.closest(&ray, RayKinds::CAMERA, f32::INFINITY)?;
-            Some(Surface::new(&world, &ray, &hit))
+            Some(Surface::new(&world, ray.direction, &hit))
         })
         .collect();
     // Over the camera's left shoulder.
@@ -119,7 +121,7 @@ fn measure(name: &str, scene: &Scene) {
             }
         };
         line("camera", &camera, closest, Some(closest_of));
-        line("shadow", &shadow, blocked, None);
+        line("shadow", &shadow, blocked, Some(blocked_of));
         line("bounce", &bounce, closest, Some(closest_of));
     }
     println!(
@@ -179,9 +181,20 @@ fn closest_of(world: &World, rays: &[RayStart]) -> usize {
 fn blocked(world: &World, rays: &[RayStart]) -> usize {
     let mut passed = Vec::new();
     let mut is_blocked = |&(origin, direction): &RayStart| {
-        world.blocked(&Ray::new(origin, direction), f32::INFINITY, |_| true, &mut passed)
+        world.blocked(&Ray::new(origin, direction), f32::INFINITY, None, |_| true, &mut passed)
     };
     rays.iter().filter(|ray| is_blocked(ray)).count()
+}
+
+fn blocked_of(world: &World, rays: &[RayStart]) -> usize {
+    let count = |rays: &[RayStart]| {
+        // No triangle has this number.
+        let leaves = (ObjectId(0), u32::MAX);
+        let rays: Vec<ShadowRay> =
+            rays.iter().map(|&start| ShadowRay { start, reach: f32::INFINITY, leaves }).collect();
+        world.blocked_of(&rays, &|_| true).iter().filter(|way| **way == Way::Blocked).count()
+    };
+    rays.chunks(LANES).map(count).sum()
 }
 
 /// Millions of rays a second in one pass.

@@ -57,7 +57,7 @@ fn own_hits(radius: f64, away: f64) -> f64 {
         let target = center + random_point(&mut state) * (0.55 * radius as f32);
         let ray = Ray::new(Vec3::ZERO, target.normalize());
         let Some(hit) = world.closest(&ray, RayKinds::CAMERA, f32::INFINITY) else { continue };
-        let surface = Surface::new(&world, &ray, &hit);
+        let surface = Surface::new(&world, ray.direction, &hit);
         let any = random_point(&mut state);
         let along = (any - surface.geometric_normal * any.dot(surface.geometric_normal)).normalize();
         for direction in [surface.geometric_normal, (along + surface.geometric_normal * 1e-4).normalize()] {
@@ -80,7 +80,7 @@ fn largest_offset() -> f64 {
     for _ in 0..2000 {
         let ray = Ray::new(Vec3::ZERO, (center + random_point(&mut state) * 0.55).normalize());
         let Some(hit) = world.closest(&ray, RayKinds::CAMERA, f32::INFINITY) else { continue };
-        let surface = Surface::new(&world, &ray, &hit);
+        let surface = Surface::new(&world, ray.direction, &hit);
         largest = largest.max(surface.leave(surface.geometric_normal).distance(surface.position));
     }
     assert!(largest > 0.0);
@@ -104,7 +104,7 @@ fn mirror_box() -> f64 {
                 leaks += 64 - bounce;
                 break;
             };
-            let surface = Surface::new(&world, &ray, &hit);
+            let surface = Surface::new(&world, ray.direction, &hit);
             let normal = surface.geometric_normal;
             direction = (direction - normal * (2.0 * direction.dot(normal))).normalize();
             origin = surface.leave(direction);

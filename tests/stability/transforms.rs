@@ -61,7 +61,7 @@ fn false_normals(scale: DVec3) -> f64 {
             faults += 1;
             continue;
         };
-        let surface = Surface::new(&world, &ray, &hit);
+        let surface = Surface::new(&world, ray.direction, &hit);
         let local = linear.inverse().transform_point3(surface.position.as_dvec3() + world.origin);
         let expected = (linear.matrix3.inverse().transpose() * local).normalize().as_vec3();
         // The facets of the ball are 3° wide; stretched ones hide how far their normals are off.
@@ -85,7 +85,7 @@ fn singular() -> f64 {
         let ray = Ray::new(Vec3::ZERO, target - world.origin.as_vec3());
         let hit = world.closest(&ray, RayKinds::CAMERA, f32::INFINITY);
         // A body squeezed to less than a float can hold is a plate seen edge-on; its normals must still be numbers.
-        hits += u32::from(hit.is_some_and(|hit| !Surface::new(&world, &ray, &hit).normal.is_normalized()));
+        hits += u32::from(hit.is_some_and(|hit| !Surface::new(&world, ray.direction, &hit).normal.is_normalized()));
         hits += u32::from(hit.is_some_and(|hit| hit.object.0 != 2));
     }
     f64::from(hits)

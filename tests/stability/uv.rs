@@ -52,7 +52,7 @@ fn seam_and_poles() -> f64 {
             faults += 1;
             continue;
         };
-        let surface = Surface::new(&world, &ray, &hit);
+        let surface = Surface::new(&world, ray.direction, &hit);
         let object = world.object(hit.object);
         let uv = surface.uv(object, &hit, 0);
         let on_sphere = turn.inverse().transform_vector3(surface.position + world.origin.as_vec3()).as_dvec3();
