@@ -56,17 +56,17 @@ def with_line_art(scene):
 
 
 def main(path, width, height, samples, how):
-    start = time.perf_counter()
+    start = time.process_time()
     scene = prepare(path, width, height, samples)
-    loaded = time.perf_counter()
+    loaded = time.process_time()
     bpy.ops.render.render()
-    plain = time.perf_counter() - loaded
-    begun = time.perf_counter()
+    plain = time.process_time() - loaded
+    begun = time.process_time()
     if how == "freestyle":
         with_freestyle(scene)
         scene.render.filepath = os.path.abspath(f"freestyle_{samples}.png")
         bpy.ops.render.render(write_still=True)
-        lined = time.perf_counter() - begun
+        lined = time.process_time() - begun
     else:
         pencil = with_line_art(scene)
         bpy.context.view_layer.update()
@@ -74,7 +74,7 @@ def main(path, width, height, samples, how):
         strokes = sum(len(layer.frames[0].drawing.strokes) for layer in evaluated.data.layers if layer.frames)
         assert strokes > 0, "Line Art drew nothing"
         # Drawing the strokes needs a GPU, which a machine for rendering may not have: this is the time to find them.
-        lined = plain + time.perf_counter() - begun
+        lined = plain + time.process_time() - begun
     print({"load": loaded - start, "render": plain, "lines": lined - plain, "samples": samples})
 
 

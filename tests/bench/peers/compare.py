@@ -4,7 +4,8 @@
 
 Peers are found by import: embreex, mitsuba, bpy (`pip install embreex mitsuba bpy numpy pillow`). Tusche, Embree and Mitsuba draw
 lines 2 px wide where object ids differ; their coverage is compared with one of 16 x 16 Embree rays a pixel. Blender has other
-lines, so it is compared by time at equal samples.
+lines, so it is compared by time at equal samples. Times are CPU seconds, summed over threads, so that other programs on the machine
+matter little.
 """
 
 import argparse
@@ -18,7 +19,6 @@ import platform
 import subprocess
 import sys
 import tempfile
-import time
 from pathlib import Path
 
 import numpy as np
@@ -41,14 +41,13 @@ def tusche(program, model, camera, size, samples):
     """A shaded picture with lines, and their coverage: two files of one run."""
     settings = ["lines.width=2.0", "lines.object=true", "lines.shader=false", "lines.normal=false", 'render.filter="box"', "render.filter_radius=0.5"]
     flags = [part for setting in settings for part in ("--set", setting)]
-    start = time.perf_counter()
     command = [program, "render", str(model), "--size", f"{size[0]}x{size[1]}", "--samples", str(samples), "--camera", camera, *flags]
     subprocess.run([*command, "--quiet", "-o", "lined.png", "--stats", "stats.json"], check=True)
-    took = time.perf_counter() - start
     subprocess.run([*command, "--quiet", "--layer", "line", "-o", "line.png"], check=True)
     line = np.asarray(Image.open("line.png").convert("RGBA"), float)[..., 3] / 255
     seconds = json.loads(Path("stats.json").read_text())["seconds"]
-    return line, {"load": seconds["load"] + seconds["build"], "total": took}
+    return line, {"load": seconds["load"] + seconds["build"],
+                  "picture": sum(seconds[stage] for stage in ("trace", "shade", "lines", "film"))}
 
 
 def main():
@@ -76,7 +75,7 @@ def main():
     for side in sides:
         samples = side * side
         line, times = tusche(program, model, camera, size, samples)
-        rows.append(("Tusche, lit, lines", samples, times["load"], times["total"] - times["load"],
+        rows.append(("Tusche, lit, lines", samples, times["load"], times["picture"],
                      scene.coverage_error(line, reference)))
     for name, script in (("embreex", "embree_lines.py"), ("mitsuba", "mitsuba_lines.py")):
         for side in sides if name in known else ():
@@ -98,7 +97,7 @@ def main():
 
     print(f"{model.name}, {size[0]} x {size[1]}, {datetime.date.today()}, {os.cpu_count()} CPUs ({platform.machine()}), "
           + ", ".join(f"{name} {version}" for name, version in known.items()))
-    print("\n| renderer | samples | load, s | picture with lines, s | line coverage error |\n|---|---|---|---|---|")
+    print("\n| renderer | samples | load, CPU s | picture with lines, CPU s | line coverage error |\n|---|---|---|---|---|")
     for label, samples, load, took, error in rows:
         told = "other lines" if error is None else f"{100 * error:.1f} %"
         print(f"| {label} | {samples} | {load:.2f} | {took:.2f} | {told} |")

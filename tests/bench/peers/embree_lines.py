@@ -38,14 +38,14 @@ def reference(path, size, side=16):
 
 def main(path, width, height, side):
     size = (width, height)
-    start = time.perf_counter()
+    start = time.process_time()
     tree, owners, camera = prepare(path)
     tree.run(*scene.rays(camera, size, 1, (0, 1)))
-    built = time.perf_counter()
+    built = time.process_time()
     found = ids(tree, owners, camera, size, side)
-    traced = time.perf_counter()
+    traced = time.process_time()
     covered = scene.coverage(found, side)
-    done = time.perf_counter()
+    done = time.process_time()
     np.save(f"embree_{side * side}.npy", covered)
     print({"load": built - start, "render": traced - built, "lines": done - traced, "samples": side * side})
 

@@ -39,14 +39,14 @@ def prepare(path, size, side):
 
 
 def main(path, width, height, side):
-    start = time.perf_counter()
+    start = time.process_time()
     world = prepare(path, (width, height), side)
-    built = time.perf_counter()
+    built = time.process_time()
     pixels = np.array(mi.render(world, spp=1))
-    traced = time.perf_counter()
+    traced = time.process_time()
     # Shapes are counted from 1; what leaves the scene has none.
     covered = scene.coverage(np.rint(pixels[..., -1]).astype(np.int16), side)
-    done = time.perf_counter()
+    done = time.process_time()
     np.save(f"mitsuba_{side * side}.npy", covered)
     print({"load": built - start, "render": traced - built, "lines": done - traced, "samples": side * side})
 
