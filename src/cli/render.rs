@@ -105,6 +105,8 @@ fn render_request(
     let layers = layers_of(&request.files);
     let mut choice = None;
     if let Some(time) = time {
+        // Before time goes into finding out what fits.
+        request.files.iter().try_for_each(|file| check_writable(&file.path))?;
         let chosen = choose_samples(&request.scene, &request.shaders, &layers, time, options, &control)?;
         let chosen = *choice.insert(chosen.ok_or_else(stopped_early)?);
         request.scene = request.scene.with_samples(chosen.samples);
@@ -158,7 +160,7 @@ fn shortfall(sampling: &Sampling) -> Option<Diagnostic> {
     let (count, most) = (found.unfinished_blocks, ErrorGoal::MOST);
     let parts = if count == 1 { "part" } else { "parts" };
     let fault = Diagnostic::warning(format!(
-        "{count} {parts} of {BLOCK} x {BLOCK} pixels did not reach an error of {} with {most} samples per pixel: the largest is {:.2}",
+        "{count} {parts} of {BLOCK} x {BLOCK} pixels did not reach an error of {} with {most} samples per pixel: the largest is {:.4}",
         found.error, found.largest_error
     ));
     Some(fault.hint("ask for a larger --error, or take a larger picture, in which detail is coarser"))
@@ -181,7 +183,8 @@ fn conclude(
     if !quiet && report.written {
         if let Some(sampling) = &report.stats.sampling {
             terminal::note(&told(sampling));
-            shortfall(sampling).into_iter().for_each(|fault| terminal::say(&fault.into()));
+            let short = shortfall(sampling).filter(|_| report.complete);
+            short.into_iter().for_each(|fault| terminal::say(&fault.into()));
         }
         for file in &request.files {
             terminal::note(&format!("wrote {} ({:.1} s)", file.path.display(), report.stats.seconds.total));
@@ -194,10 +197,13 @@ fn conclude(
     if !report.complete {
         let files: Vec<String> = request.files.iter().map(|file| file.path.display().to_string()).collect();
         let fault = Diagnostic::error("stopped before the picture was complete");
-        let fault = if report.written {
-            fault.hint(format!("what is done is in {}; the rest is transparent black", files.join(" and ")))
-        } else {
-            fault.hint("nothing was done yet, and nothing was written")
+        let files = files.join(" and ");
+        let fault = match (report.written, &report.stats.sampling) {
+            (false, _) => fault.hint("nothing was done yet, and nothing was written"),
+            (true, Some(Sampling::Error(_))) => {
+                fault.hint(format!("what is in {files} is not as accurate everywhere as was asked for"))
+            }
+            (true, _) => fault.hint(format!("what is done is in {files}; the rest is transparent black")),
         };
         let fault = fault.hint("run the same command again for the whole picture");
         return Err(Diagnostics::from(fault).into());
