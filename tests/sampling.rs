@@ -337,7 +337,10 @@ fn what_cannot_be_chosen_is_told() {
     refused(&["--error", "-0.1"], "above 0 and below 1");
     refused(&["--error", "nan"], "above 0 and below 1");
     refused(&["--error", "1e-5"], "is the least");
-    place.run(&["render", "scene.toml", "--time", "60", "-o", "no/such/folder.png"]).exits(1).says("no/such/folder.png");
+    place
+        .run(&["render", "scene.toml", "--time", "60", "-o", "no/such/folder.png"])
+        .exits(1)
+        .says("no/such/folder.png");
     let too_short = ["render", "scene.toml", "--size", "2000x1500", "--time", "0.001", "-o", "none.png"];
     place.run(&too_short).exits(1).says("too short for this picture").says("give --time").says("--size");
     assert!(!place.folder.path().join("none.png").exists());
