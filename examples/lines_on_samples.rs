@@ -5,7 +5,7 @@
 use tusche::line::{LineTile, Method, Rules, TileBounds, Window, find_lines};
 use tusche::sample::position::SamplePositions;
 use tusche::sample::{Node, NodeColumnSet, NodePath, PixelRect, SampleBufferBuilder, SampleColor, SampleLayout};
-use tusche::scene::settings::LineSettings;
+use tusche::scene::settings::{LineSettings, Sampler};
 
 const SIZE: [u32; 2] = [64, 32];
 const SAMPLES: u32 = 4;
@@ -22,13 +22,13 @@ fn main() {
 
     // Every sample sees a disc or the background. (Terminal characters are twice as high as wide.)
     let rect = PixelRect::of_size(SIZE);
-    let positions = SamplePositions::new(SAMPLES, 0);
+    let positions = SamplePositions::new(Sampler::Stratified, SAMPLES, 0);
     let mut builder = SampleBufferBuilder::new(rect, &layout);
     for index in 0..rect.pixels() as u32 {
         let pixel = [(index % SIZE[0]) as i32, (index / SIZE[0]) as i32];
         for s in 0..SAMPLES {
             let sample = index * SAMPLES + s;
-            let offset = positions.offset(pixel, s);
+            let offset = positions.of_pixel(pixel).offset(s);
             let (x, y) = (pixel[0] as f32 + offset[0], pixel[1] as f32 + offset[1]);
             let on_disc = ((x - 32.0) / 2.0).hypot(y - 16.0) < 11.0;
             builder.set_sample(sample, offset, SampleColor::default(), u32::from(on_disc));

@@ -5,8 +5,9 @@ use tusche::line::Method;
 use tusche::render::RenderOptions;
 use tusche::sample::PixelRect;
 use tusche::scene::Scene;
+use tusche::scene::settings::Sampler;
 
-use crate::common::{render_with, scene_from, shipped_scenes};
+use crate::common::{render_with, root, scene_from, shipped_scenes};
 
 const LAYERS: [Layer; 6] = [Layer::Rgba, Layer::Color, Layer::Line, Layer::HiddenLine, Layer::Depth, Layer::Object];
 
@@ -31,6 +32,32 @@ fn threads_tiles_and_runs_change_no_bit() {
         let reference = bits(1, 32);
         for (threads, tile) in [(1, 32), (2, 8), (4, 32), (2, 100)] {
             assert!(bits(threads, tile) == reference, "{name}: {threads} threads, tiles of {tile}");
+        }
+    }
+}
+
+#[test]
+fn threads_tiles_and_crops_change_no_bit_of_any_sampler() {
+    for sampler in Sampler::ALL {
+        for samples in [4, 9] {
+            let mut builder = small(&root().join("scenes/hello.toml")).into_builder();
+            (builder.render.sampler, builder.render.samples) = (sampler, samples);
+            let scene = builder.build().unwrap_or_else(|faults| panic!("{faults}"));
+            let whole = render_with(&scene, &LAYERS, &RenderOptions::default()).0;
+            let crop = Some(PixelRect { x0: 31, y0: 9, x1: 57, y1: 30 });
+            for (threads, tile, crop) in [(1, 8, None), (2, 100, None), (2, 16, crop)] {
+                let options = RenderOptions { threads, tile, crop, ..RenderOptions::default() };
+                let part = render_with(&scene, &LAYERS, &options).0;
+                let rect = crop.unwrap_or(PixelRect::of_size(scene.render().size));
+                for y in rect.y0 as usize..rect.y1 as usize {
+                    for x in rect.x0 as usize..rect.x1 as usize {
+                        for channel in 0..whole.channels.len() {
+                            let [a, b] = [&whole, &part].map(|picture| picture.at(channel, x, y).to_bits());
+                            assert_eq!(a, b, "{sampler:?}, {samples} samples, channel {channel} at {x}, {y}");
+                        }
+                    }
+                }
+            }
         }
     }
 }

@@ -120,8 +120,11 @@ fn by_definition(scene: &Scene, goal: &ErrorGoal, method: Method) -> (Picture, V
                 (colors / (3.0 * count)).sqrt().max((lines / count).sqrt())
             };
             let (mut before, mut rate) = (FIRST, 2 * FIRST);
-            while let Some(next) = next_rate(goal, rate, estimate(rms(picture(before), picture(rate)), [before, rate]))
-            {
+            while let Some(next) = next_rate(
+                goal,
+                rate,
+                estimate(rms(picture(before), picture(rate)), [before, rate], scene.render().sampler),
+            ) {
                 (before, rate) = (rate, next);
             }
             for (x, y) in places {

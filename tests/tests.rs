@@ -5,6 +5,7 @@ mod common;
 // From the outside in: the command, its input, ...
 mod cli;
 mod gltf;
+mod mesh_file;
 mod scene_file;
 // ... scripts and what is known of them, ...
 mod analysis;

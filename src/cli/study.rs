@@ -33,6 +33,7 @@ pub(super) fn run(arguments: &StudyArguments) -> Result<(), Failure> {
         repeats: arguments.repeats,
         reference: arguments.reference,
         budget: arguments.budget.map(|budget| budget.0),
+        widths: arguments.knob.is_empty(),
         threads: arguments.threads.map_or(0, usize::from),
     };
     let bar = terminal::Progress::new(!scene.quiet, "study".into());

@@ -9,8 +9,9 @@ use clap::Args;
 use super::args::{LineMode, SceneArguments};
 use super::request::{check_outputs, scene_request};
 use super::{Failure, terminal};
+use crate::diag::Diagnostic;
 use crate::film::check_writable;
-use crate::live::{News, PageOptions, SessionOptions, TEV_ADDRESS, Watch, WatchOptions};
+use crate::live::{Kept, News, PageOptions, SessionOptions, TEV_ADDRESS, Watch, WatchOptions};
 
 #[derive(Debug, Args)]
 #[command(
@@ -154,6 +155,11 @@ impl Talk {
             News::Wrote(path) => terminal::note(&format!("wrote {}", path.display())),
             News::Saved(path) => terminal::note(&format!("wrote the page's edits to {}", path.display())),
             News::Note(text) => terminal::note(&text),
+            News::Memory(cache) if cache.kept == Kept::All => terminal::note(&cache.to_string()),
+            News::Memory(cache) => {
+                let hint = "give it more with --cache, or ask for fewer pixels or samples";
+                terminal::say(&Diagnostic::warning(cache.to_string()).hint(hint).into());
+            }
             News::Picture { .. } | News::Loaded { .. } | News::Progress { .. } => {}
         }
     }

@@ -114,12 +114,12 @@ fn filter_fields(window: &FilmWindow<'_>, rect: PixelRect, filter: &Filter, fiel
     if fields.is_empty() {
         return Vec::new();
     }
-    let ground = even_ground(window, rect, filter.reach(), fields);
+    let grounds = even_grounds(window, rect, filter.reach(), fields);
     let mut spread = Spread::new(filter, rect);
     let mut sums = vec![Sums::new(filter, rect); fields.len()];
     let (mut values, mut plain_part, mut part) = (Vec::new(), Vec::new(), Vec::new());
     window.visit(rect.grown(filter.reach()), |pixel| {
-        if !ground.is_filtered([pixel.x, pixel.y]) {
+        if !grounds.iter().any(|ground| ground.is_filtered([pixel.x, pixel.y])) {
             return;
         }
         spread.weigh(filter, [pixel.x, pixel.y], &pixel.buffer.offset[pixel.first..pixel.end]);
@@ -154,26 +154,26 @@ fn filter_fields(window: &FilmWindow<'_>, rect: PixelRect, filter: &Filter, fiel
             }
         });
     }
-    for (field, filtered) in filtered.iter_mut().enumerate() {
+    for (filtered, ground) in filtered.iter_mut().zip(&grounds) {
         let pixels = (rect.y0..rect.y1).flat_map(|y| (rect.x0..rect.x1).map(move |x| [x, y]));
         for (filtered, pixel) in filtered.iter_mut().zip(pixels) {
-            *filtered = ground.value(pixel, field).unwrap_or(*filtered);
+            *filtered = ground.value(pixel).unwrap_or(*filtered);
         }
     }
     filtered
 }
 
-/// Where no filter is needed.
-fn even_ground(window: &FilmWindow<'_>, rect: PixelRect, reach: i32, fields: &[Field]) -> EvenGround {
+/// Where no filter is needed, for each field: no layer depends on which others are asked for.
+fn even_grounds(window: &FilmWindow<'_>, rect: PixelRect, reach: i32, fields: &[Field]) -> Vec<EvenGround> {
     let sources = rect.grown(reach);
-    let mut values = vec![None; sources.pixels() * fields.len()];
+    let mut values = vec![vec![None; sources.pixels()]; fields.len()];
     window.visit(sources, |pixel| {
-        let place = index_in(sources, pixel.x, pixel.y) * fields.len();
-        for (value, field) in values[place..].iter_mut().zip(fields) {
-            *value = field.one_value(&pixel);
+        let place = index_in(sources, pixel.x, pixel.y);
+        for (values, field) in values.iter_mut().zip(fields) {
+            values[place] = field.one_value(&pixel);
         }
     });
-    EvenGround::new(rect, reach, fields.len(), values)
+    values.into_iter().map(|values| EvenGround::new(rect, reach, values)).collect()
 }
 
 fn index_in(rect: PixelRect, x: i32, y: i32) -> usize {

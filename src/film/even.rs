@@ -7,16 +7,15 @@
 use crate::math::Vec4;
 use crate::sample::PixelRect;
 
-/// Which pixels of a rectangle are even, and what they are.
+/// Which pixels of a rectangle are even in one field, and what they are.
 #[derive(Debug)]
 pub(super) struct EvenGround {
     /// What has samples that may reach the rectangle.
     sources: PixelRect,
     reach: i32,
-    /// The one value of each source pixel's samples, for each field; `None` where they differ, or there are none.
+    /// The one value of each source pixel's samples; `None` where they differ, or there are none.
     values: Vec<Option<Vec4>>,
-    fields: usize,
-    /// Sources without a value in some field.
+    /// Sources without a value.
     mixed: Counts,
     /// Sources with another value than the one left of them.
     left: Counts,
@@ -27,15 +26,15 @@ pub(super) struct EvenGround {
 }
 
 impl EvenGround {
-    /// `values` are those of the pixels that reach `rect`, row by row, each with all its `fields`.
-    pub(super) fn new(rect: PixelRect, reach: i32, fields: usize, values: Vec<Option<Vec4>>) -> Self {
+    /// `values` are those of the pixels that reach `rect`, row by row.
+    pub(super) fn new(rect: PixelRect, reach: i32, values: Vec<Option<Vec4>>) -> Self {
         let sources = rect.grown(reach);
-        let of = |x: i32, y: i32| place(sources, fields, [x, y]).and_then(|place| values.get(place));
-        let mixed = Counts::new(sources, |x, y| of(x, y).is_none_or(|values| values.contains(&None)));
+        let of = |x: i32, y: i32| place(sources, [x, y]).and_then(|place| values[place]);
+        let mixed = Counts::new(sources, |x, y| of(x, y).is_none());
         let left = Counts::new(sources, |x, y| of(x, y) != of(x - 1, y));
         let above = Counts::new(sources, |x, y| of(x, y) != of(x, y - 1));
         let uneven = Counts::default();
-        let mut ground = Self { sources, reach, fields, mixed, left, above, uneven, values };
+        let mut ground = Self { sources, reach, mixed, left, above, uneven, values };
         ground.uneven = Counts::new(rect, |x, y| !ground.surrounds([x, y]));
         ground
     }
@@ -53,19 +52,16 @@ impl EvenGround {
         self.uneven.any(PixelRect { x0: x, y0: y, x1: x + 1, y1: y + 1 }.grown(self.reach))
     }
 
-    /// The value of a pixel of the rectangle, for each field, if it is even.
-    pub(super) fn value(&self, pixel: [i32; 2], field: usize) -> Option<Vec4> {
-        if !self.surrounds(pixel) {
-            return None;
-        }
-        *self.values.get(place(self.sources, self.fields, pixel)?.start + field)?
+    /// The value of a pixel of the rectangle, if it is even.
+    pub(super) fn value(&self, pixel: [i32; 2]) -> Option<Vec4> {
+        if self.surrounds(pixel) { self.values[place(self.sources, pixel)?] } else { None }
     }
 }
 
-/// Where a pixel's values stand; `None` outside.
-fn place(sources: PixelRect, fields: usize, [x, y]: [i32; 2]) -> Option<std::ops::Range<usize>> {
-    let pixel = (y - sources.y0) as usize * sources.width() as usize + (x - sources.x0) as usize;
-    sources.contains(x, y).then(|| pixel * fields..(pixel + 1) * fields)
+/// Where a pixel's value stands; `None` outside.
+fn place(sources: PixelRect, [x, y]: [i32; 2]) -> Option<usize> {
+    let place = || (y - sources.y0) as usize * sources.width() as usize + (x - sources.x0) as usize;
+    sources.contains(x, y).then(place)
 }
 
 /// How many pixels of any rectangle are marked, from a table of sums (Crow 1984).
@@ -115,7 +111,7 @@ mod tests {
     /// Whether each pixel is even, by looking at all sources.
     fn brute(rect: PixelRect, reach: i32, values: &[Option<Vec4>]) -> Vec<bool> {
         let sources = rect.grown(reach);
-        let of = |x: i32, y: i32| values[place(sources, 1, [x, y]).map_or(0, |place| place.start)];
+        let of = |x: i32, y: i32| values[place(sources, [x, y]).unwrap_or(0)];
         let pixels = (rect.y0..rect.y1).flat_map(|y| (rect.x0..rect.x1).map(move |x| (x, y)));
         pixels
             .map(|(x, y)| {
@@ -144,9 +140,9 @@ mod tests {
                 values.iter_mut().skip(place).take(many).for_each(|known| *known = value);
             }
             let expected = brute(rect, reach, &values);
-            let ground = EvenGround::new(rect, reach, 1, values);
+            let ground = EvenGround::new(rect, reach, values);
             let pixels = (rect.y0..rect.y1).flat_map(|y| (rect.x0..rect.x1).map(move |x| [x, y]));
-            let found: Vec<bool> = pixels.map(|pixel| ground.value(pixel, 0).is_some()).collect();
+            let found: Vec<bool> = pixels.map(|pixel| ground.value(pixel).is_some()).collect();
             assert_eq!(found, expected, "case {case}");
             even += found.iter().filter(|even| **even).count();
             for y in rect.y0 - reach..rect.y1 + reach {
@@ -154,7 +150,7 @@ mod tests {
                     let targets = PixelRect { x0: x, y0: y, x1: x + 1, y1: y + 1 }.grown(reach).intersection(&rect);
                     let mut reached =
                         (targets.y0..targets.y1).flat_map(|y| (targets.x0..targets.x1).map(move |x| [x, y]));
-                    let reaches = reached.any(|pixel| ground.value(pixel, 0).is_none());
+                    let reaches = reached.any(|pixel| ground.value(pixel).is_none());
                     assert_eq!(ground.is_filtered([x, y]), reaches, "case {case} at {x}, {y}");
                 }
             }

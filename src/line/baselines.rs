@@ -149,6 +149,7 @@ fn sample_in_pixel(tile: &PathTile<'_>, row: usize) -> u32 {
 /// The one line that there is.
 fn plain_line(rules: &Rules, fired: Fired, neighbor: ([i32; 2], u32)) -> SeenLine {
     SeenLine {
+        covers: false,
         color: rules.settings().color.to_array(),
         alpha: 1.0,
         lined: [0.0; 3],

@@ -64,6 +64,8 @@ pub struct SeenLine {
     pub alpha: f32,
     /// The sample's colour with the line in it.
     pub lined: [f32; 3],
+    /// Whether `lined` is the same whatever the sample's colour is.
+    pub covers: bool,
     /// At which node the line was found.
     pub path: NodePath,
     /// Which tests fired.

@@ -6,7 +6,8 @@ use super::style::LineScript;
 use super::types::TypeRules;
 use crate::math::portable;
 use crate::sample::NodePath;
-use crate::scene::settings::{LineOverrides, LineSettings, RayKinds};
+use crate::sample::position::gap_factor;
+use crate::scene::settings::{Composition, LineOverrides, LineSettings, RayKinds, Sampler};
 
 /// [`LineSettings`] with all that follows from them and the sample rate worked out once.
 #[derive(Clone, Debug, PartialEq)]
@@ -47,13 +48,18 @@ impl HiddenStyle {
 }
 
 impl Rules {
-    /// Rules for a sample rate: samples per pixel, at least 1, that are compared with each other.
+    /// Rules for a sample rate: samples per pixel, at least 1, that are compared with each other, plainly jittered.
     #[must_use]
     pub fn new(settings: &LineSettings, samples_per_pixel: u32) -> Self {
-        // h(r, ρ) = c · (3 / (4 √(2r) ρ))^(2/3) falls with the cube root of r alone: DESIGN section 3.9. c is that of
-        // jittered samples.
+        Self::for_sampler(settings, Sampler::Stratified, samples_per_pixel)
+    }
+
+    /// The same for samples of any sampler.
+    #[must_use]
+    pub fn for_sampler(settings: &LineSettings, sampler: Sampler, samples_per_pixel: u32) -> Self {
+        // h(r, ρ) = c · (3 / (4 √(2r) ρ))^(2/3) falls with the cube root of r alone: DESIGN section 3.9.
         let per_side = 3.0 / (4.0 * samples_per_pixel.max(1) as f32);
-        let unit_gap = 0.84 * portable::pow(per_side, 2.0 / 3.0) / portable::cbrt(2.0);
+        let unit_gap = gap_factor(sampler) * portable::pow(per_side, 2.0 / 3.0) / portable::cbrt(2.0);
         let mut rules = Self {
             widest: settings.max_width.max(0.0),
             unit_gap: f64::from(unit_gap),
@@ -115,6 +121,12 @@ impl Rules {
             && self.settings.paths == other.settings.paths
             && self.settings.surfaces == other.settings.surfaces
             && self.no_scripts() == other.no_scripts()
+    }
+
+    /// Whether lines look otherwise where nodes pass on other amounts of light.
+    #[must_use]
+    pub fn read_light(&self) -> bool {
+        self.settings.tint || self.settings.compose == Composition::Throughput
     }
 
     /// The same rules, knowing what each material's script changes about its lines, by material id.

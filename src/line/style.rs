@@ -243,6 +243,7 @@ impl Styler<'_, '_> {
             color: color.to_array(),
             alpha: covered,
             lined: lined.to_array(),
+            covers: settings.compose == Composition::Replace && drawn.iter().any(|line| line.alpha == 1.0),
             path: found.path,
             hidden: found.hidden,
             fired: drawn.first()?.fired,

@@ -85,9 +85,12 @@ impl Board {
         Self { state: Mutex::default(), version: watch::Sender::new(0) }
     }
 
-    /// Replaces what a topic says.
+    /// Replaces what a topic says; what it says already is no news.
     pub fn post(&self, topic: Topic, text: String) {
         let mut state = self.lock();
+        if *state.topics[topic as usize].1 == *text {
+            return;
+        }
         state.version += 1;
         state.topics[topic as usize] = (state.version, text.into());
         self.version.send_replace(state.version);
@@ -158,7 +161,7 @@ fn joined(a: PixelRect, b: PixelRect) -> PixelRect {
 mod tests {
     use super::*;
     use crate::diag::Diagnostics;
-    use crate::live::Redone;
+    use crate::live::{CacheUse, Kept, Redone};
     use crate::render::stats::Stats;
 
     const WHOLE: PixelRect = PixelRect { x0: 0, y0: 0, x1: 8, y1: 4 };
@@ -173,6 +176,7 @@ mod tests {
             channels: Vec::new(),
             changed,
             redone: Redone::default(),
+            cache: CacheUse { kept: Kept::All, needed: 0, limit: 0 },
             stats: Stats::default(),
             warnings: Diagnostics::default(),
             script_errors: Diagnostics::default(),
@@ -217,6 +221,7 @@ mod tests {
         board.post(Topic::Faults, "3".into());
         let news: Vec<_> = board.news(&mut read).into_iter().map(|(topic, text)| (topic, text.to_string())).collect();
         assert_eq!(news, [(Topic::Scene, "2".to_owned()), (Topic::Faults, "3".to_owned())]);
+        board.post(Topic::Scene, "2".into());
         assert!(board.news(&mut read).is_empty());
     }
 }

@@ -55,6 +55,11 @@ impl Redo {
         *self == Self::default()
     }
 
+    /// Whether anything must be shaded again.
+    pub fn shades(&self) -> bool {
+        self.shade || self.visibility || !self.shade_materials.is_empty()
+    }
+
     /// Adds what another asks for.
     pub fn add(&mut self, other: &Self) {
         self.trace |= other.trace;
@@ -82,8 +87,7 @@ impl Redo {
             && same_sampling(old.scene, new.scene)
             && old.plan.surfaces == new.plan.surfaces
             && old.plan.bodies == new.plan.bodies
-            // Which surfaces a list keeps depends on the tests.
-            && (new.plan.surfaces == 1 || same_tests(old, new));
+            && (new.plan.surfaces == 1 || same_lists(old, new));
         if !same_rays {
             return Self::all();
         }
@@ -154,14 +158,18 @@ fn same_ties(old: &Scene, new: &Scene) -> bool {
 /// Whether the camera's rays start alike.
 fn same_sampling(old: &Scene, new: &Scene) -> bool {
     let (a, b) = (old.render(), new.render());
-    a.size == b.size && a.samples == b.samples && a.seed == b.seed
+    a.size == b.size && a.samples == b.samples && a.sampler == b.sampler && a.seed == b.seed
 }
 
-/// Whether the tests of the line pass are the same, for every material.
-fn same_tests(old: View<'_>, new: View<'_>) -> bool {
-    let overrides = |view: View<'_>| -> Vec<_> { view.scene.materials().iter().map(|m| m.lines).collect() };
-    let tests = |view: View<'_>| view.plan.lines.as_ref().map(|lines| lines.tests.clone());
-    tests(old) == tests(new) && overrides(old) == overrides(new)
+/// Whether lists keep the same surfaces of those that rays meet.
+fn same_lists(old: View<'_>, new: View<'_>) -> bool {
+    let kept = |view: View<'_>| {
+        let tests = view.plan.lines.as_ref().map(|lines| &lines.tests);
+        tests.map(|tests| (tests.tests_shapes(), tests.object, tests.shader, tests.paths))
+    };
+    kept(old) == kept(new)
+        && old.plan.lists_are_opaque() == new.plan.lists_are_opaque()
+        && old.scene.stand_ins() == new.scene.stand_ins()
 }
 
 /// Whether rays that leave the scene see the same.
@@ -240,9 +248,7 @@ fn compare_material(redo: &mut Redo, id: MaterialId, (a, old): (&Shader, View<'_
         redo.shade = true;
         return;
     }
-    // One surface of many in a list: only tracing tells which.
-    let restylable = new.plan.surfaces == 1
-        && same_but_for_lines(before, after)
+    let restylable = same_but_for_lines(before, after)
         && (same || a.same_outputs(b, OutputSet::all().difference(LINE_SLICE)))
         && !a.may_fail(LINE_SLICE)
         && !b.may_fail(LINE_SLICE);
@@ -268,6 +274,9 @@ fn same_but_for_lines(old: &MaterialPlan, new: &MaterialPlan) -> bool {
         plan.inputs = InputSet::empty();
         plan.mode = Mode::Constant;
         plan.lights = false;
+        plan.behind.wanted = plan.behind.wanted.difference(LINE_SLICE);
+        plan.behind.inputs = InputSet::empty();
+        plan.behind.lights = false;
         plan
     };
     but_for_lines(old) == but_for_lines(new)

@@ -91,7 +91,7 @@ pub struct Range {
 static SCHEMA: LazyLock<Json> = LazyLock::new(file::schema);
 
 /// Keys of `[render]` that matter while a look is found; the others make another picture.
-const RENDER: [&str; 4] = ["samples", "ambient", "filter", "filter_radius"];
+const RENDER: [&str; 5] = ["samples", "sampler", "ambient", "filter", "filter_radius"];
 
 /// The controls of a scene. `written` is what its file says, with overrides and edits put in.
 #[must_use]

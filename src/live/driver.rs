@@ -23,7 +23,7 @@ use super::outputs::Outputs;
 use super::server::{Server, messages};
 use super::tev::Tev;
 use super::watch::{Command, Message, News, WatchOptions};
-use super::{Event, LivePicture, Session, Setup};
+use super::{Event, Kept, LivePicture, Session, Setup};
 use crate::diag::{Diagnostic, Diagnostics};
 use crate::files::FileStore;
 use crate::film::{Layer, write_atomically};
@@ -46,6 +46,8 @@ const MOST_RETRIES: u32 = 8;
 const SOON: Duration = Duration::from_millis(50);
 /// How often pages hear of progress.
 const PROGRESS: Duration = Duration::from_millis(40);
+/// From when on: what is done sooner needs no bar, and a browser on the same cores would only hold it up.
+const PROGRESS_FROM: Duration = Duration::from_millis(200);
 
 pub(super) struct Driver {
     options: WatchOptions,
@@ -84,6 +86,8 @@ pub(super) struct Driver {
     told: [Diagnostics; 2],
     /// When pages last heard of progress.
     progress: Option<Instant>,
+    /// What was kept of the last picture.
+    kept: Kept,
 }
 
 /// Events that belong together.
@@ -153,6 +157,7 @@ impl Driver {
             script_errors: Diagnostics::default(),
             told: Default::default(),
             progress: None,
+            kept: Kept::All,
         }
     }
 
@@ -372,7 +377,8 @@ impl Driver {
         match event {
             Event::Begun { .. } => {}
             Event::Progress { samples, share, .. } => {
-                if self.progress.is_none_or(|last| last.elapsed() >= PROGRESS) {
+                let is_slow = self.current.as_ref().is_none_or(|current| current.began.elapsed() >= PROGRESS_FROM);
+                if is_slow && self.progress.is_none_or(|last| last.elapsed() >= PROGRESS) {
                     self.progress = Some(Instant::now());
                     self.board.post(Topic::Progress, messages::progress(samples, share));
                 }
@@ -403,6 +409,10 @@ impl Driver {
         }
         if let Some(tev) = &self.tev {
             tev.show(&picture);
+        }
+        if picture.is_final && self.kept != picture.cache.kept {
+            self.kept = picture.cache.kept;
+            tell(News::Memory(picture.cache));
         }
         if is_newest && picture.is_final {
             for file in &current.files {

@@ -21,7 +21,7 @@ mod tev;
 pub mod watch;
 
 pub use server::PageOptions;
-pub use session::{Event, LivePicture, Session, SessionOptions, Setup};
+pub use session::{CacheUse, Event, Kept, LivePicture, Session, SessionOptions, Setup};
 pub use stages::Redone;
 pub use tev::DEFAULT_ADDRESS as TEV_ADDRESS;
 pub use watch::{News, Watch, WatchHandle, WatchOptions};

@@ -1,6 +1,7 @@
 //! A session: one thread that always works on the newest setup, and tells its subscribers what comes of it.
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::fmt;
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
@@ -45,6 +46,40 @@ impl Default for SessionOptions {
     }
 }
 
+/// What is kept of a picture so that later edits need less work.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kept {
+    /// Samples, lines, and what rays met.
+    All,
+    /// Not what rays met: they are traced again when hits must be shaded.
+    Samples,
+    /// No more than the picture: every edit renders all of it again.
+    Nothing,
+}
+
+/// Memory that is used so that later edits need less work.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CacheUse {
+    /// What the limit leaves room for.
+    pub kept: Kept,
+    /// About how many bytes it takes to keep all.
+    pub needed: u64,
+    /// How many may be used: [`SessionOptions::cache_bytes`].
+    pub limit: u64,
+}
+
+impl fmt::Display for CacheUse {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mib = |bytes: u64| bytes.div_ceil(1 << 20);
+        let lacking = match self.kept {
+            Kept::All => return write!(f, "all is kept: about {} MiB", mib(self.needed)),
+            Kept::Samples => "what rays met is not kept, and traced again when a shader or a light changes",
+            Kept::Nothing => "only the picture is kept, and every edit renders all of it again",
+        };
+        write!(f, "the memory limit is {} MiB and about {} are needed: {lacking}", mib(self.limit), mib(self.needed))
+    }
+}
+
 /// A complete picture.
 #[derive(Clone, Debug)]
 pub struct LivePicture {
@@ -64,6 +99,8 @@ pub struct LivePicture {
     pub changed: PixelRect,
     /// What was done again for it.
     pub redone: Redone,
+    /// What is kept of it.
+    pub cache: CacheUse,
     /// What it cost.
     pub stats: Stats,
     /// What the gate stopped.
@@ -245,13 +282,21 @@ impl Shared {
         self.lock().subscribers.retain(|subscriber| subscriber.send(event.clone()).is_ok());
     }
 
+    /// Tells of progress if that is worth the waking of those who listen: `steps` are those that were told.
+    fn tell_progress(&self, steps: &AtomicU32, generation: u64, samples: u32, share: f64) {
+        let step = (share * PROGRESS_STEPS) as u32;
+        if steps.fetch_max(step, Ordering::Relaxed) < step {
+            self.tell(&Event::Progress { generation, samples, share });
+        }
+    }
+
     /// The worker's life.
     fn work(&self) {
         let pool = match rayon::ThreadPoolBuilder::new().num_threads(self.options.threads).build() {
             Ok(pool) => pool,
             Err(error) => return self.give_up(&Diagnostic::error(format!("cannot start rendering threads: {error}"))),
         };
-        let mut kept = Kept::default();
+        let mut kept = Memory::default();
         while let Some((setup, generation)) = self.next_setup() {
             self.tell(&Event::Begun { generation });
             if let Err(faults) = pool.install(|| self.show(&setup, generation, &mut kept)) {
@@ -290,43 +335,53 @@ impl Shared {
     }
 
     /// Renders all pictures of a setup, until the final one or until a newer setup has come.
-    fn show(&self, setup: &Arc<Setup>, generation: u64, kept: &mut Kept) -> Result<(), Diagnostics> {
-        let last = setup.scene.render().samples;
-        let mut samples = if self.options.progressive { 1 } else { last };
+    fn show(&self, setup: &Arc<Setup>, generation: u64, kept: &mut Memory) -> Result<(), Diagnostics> {
+        let RenderSettings { samples: last, size, .. } = *setup.scene.render();
+        let mut samples = last;
         if let Some(stages) = &mut kept.stages {
             let prepared = Prepared::new(setup, stages.samples(), Some(stages.prepared()))?;
             let redo = stages.redo_for(&prepared);
             if !redo.trace && (stages.samples() == last || (self.options.progressive && stages.samples() < last)) {
-                let slow = stages.seconds_to_shade(&redo) > PATIENCE;
+                let seconds = stages.seconds_for(&redo);
+                // A picture of one sample is traced from scratch; it must come much sooner to be worth that.
+                let needed = self.cache_for(Some(stages), stages.prepared()).needed;
+                let kept_of_it = if stages.keeps_records() { Kept::All } else { Kept::Samples };
+                let cache = CacheUse { kept: kept_of_it, needed, limit: self.options.cache_bytes };
+                let slow = seconds > PATIENCE && stages.seconds_at(1, size) < seconds / 3.0;
                 stages.set(prepared, &redo);
                 if slow && self.options.progressive && stages.samples() > 1 {
                     let preview = Prepared::new(setup, 1, Some(stages.prepared()))?;
                     let mut preview = Stages::new(preview, self.options.tile, false);
                     kept.shown = false;
-                    if !self.bring_up_to_date(&mut preview, generation, last, true) {
+                    if !self.bring_up_to_date(&mut preview, cache, (generation, last), true) {
                         return Ok(());
                     }
                 }
-                let is_done = self.bring_up_to_date(stages, generation, last, !kept.shown);
+                let is_done = self.bring_up_to_date(stages, cache, (generation, last), !kept.shown);
                 kept.shown |= is_done;
                 if !is_done || stages.samples() == last {
                     return Ok(());
                 }
-                samples = (stages.samples() * 2).min(last);
+                samples = next_rung(stages, last, size);
+            } else if self.options.progressive && stages.seconds_at(last, size) > AT_ONCE {
+                samples = 1;
             }
+        } else if self.options.progressive {
+            samples = 1;
         }
         loop {
             let prepared = Prepared::new(setup, samples, kept.stages.as_ref().map(Stages::prepared))?;
-            let is_done = match self.cache_for(kept.stages.as_ref(), &prepared) {
-                Cache::Nothing => {
-                    *kept = Kept::default();
-                    self.stream(&prepared, generation, samples == last)?
+            let cache = self.cache_for(kept.stages.as_ref(), &prepared);
+            let is_done = match cache.kept {
+                Kept::Nothing => {
+                    *kept = Memory::default();
+                    self.stream(&prepared, cache, generation, samples == last)?
                 }
-                cache => {
-                    let mut stages = Stages::new(prepared, self.options.tile, cache == Cache::All);
-                    let is_done = self.bring_up_to_date(&mut stages, generation, last, true);
+                Kept::All | Kept::Samples => {
+                    let mut stages = Stages::new(prepared, self.options.tile, cache.kept == Kept::All);
+                    let is_done = self.bring_up_to_date(&mut stages, cache, (generation, last), true);
                     if is_done {
-                        *kept = Kept { stages: Some(stages), shown: true };
+                        *kept = Memory { stages: Some(stages), shown: true };
                     }
                     is_done
                 }
@@ -334,26 +389,36 @@ impl Shared {
             if !is_done || samples == last {
                 return Ok(());
             }
-            samples = (samples * 2).min(last);
+            samples = kept.stages.as_ref().map_or((samples * 2).min(last), |stages| next_rung(stages, last, size));
         }
     }
 
     /// How much of a picture fits into the memory that may be used.
-    fn cache_for(&self, half: Option<&Stages>, prepared: &Prepared) -> Cache {
-        let [with_records, without] = half.map_or(BYTES_PER_SAMPLE, Stages::bytes_per_sample);
+    fn cache_for(&self, like: Option<&Stages>, prepared: &Prepared) -> CacheUse {
+        let [with_records, without] = like.map_or(BYTES_PER_SAMPLE, Stages::bytes_per_sample);
         let render = prepared.scene.render();
         let samples = u64::from(render.size[0]) * u64::from(render.size[1]) * u64::from(render.samples);
-        match samples.saturating_mul(with_records) {
-            bytes if bytes <= self.options.cache_bytes => Cache::All,
-            _ if samples.saturating_mul(without) <= self.options.cache_bytes => Cache::Samples,
-            _ => Cache::Nothing,
-        }
+        let [needed, without] = [with_records, without].map(|bytes| samples.saturating_mul(bytes));
+        let limit = self.options.cache_bytes;
+        let kept = match () {
+            () if needed <= limit => Kept::All,
+            () if without <= limit => Kept::Samples,
+            () => Kept::Nothing,
+        };
+        CacheUse { kept, needed, limit }
     }
 
     /// Does what is due, and shows the picture; whether it was not cancelled.
-    fn bring_up_to_date(&self, stages: &mut Stages, generation: u64, last: u32, shows_all: bool) -> bool {
+    fn bring_up_to_date(
+        &self,
+        stages: &mut Stages,
+        cache: CacheUse,
+        (generation, last): (u64, u32),
+        shows_all: bool,
+    ) -> bool {
         let samples = stages.samples();
-        let progress = |share: f64| self.tell(&Event::Progress { generation, samples, share });
+        let steps = AtomicU32::new(0);
+        let progress = |share: f64| self.tell_progress(&steps, generation, samples, share);
         let control = Control { cancel: Some(&self.cancel), progress: Some(&progress) };
         let Some(Outcome { report, redone, changed }) = stages.work(&control) else { return false };
         let scene = &stages.prepared().scene;
@@ -367,6 +432,7 @@ impl Shared {
             channels: stages.channels().to_vec(),
             changed: if shows_all { whole } else { changed },
             redone,
+            cache,
             stats: report.stats,
             warnings: report.warnings,
             script_errors: report.script_errors,
@@ -382,13 +448,20 @@ impl Shared {
     }
 
     /// Renders a picture of which nothing can be kept; whether it was not cancelled.
-    fn stream(&self, prepared: &Prepared, generation: u64, is_final: bool) -> Result<bool, Diagnostics> {
+    fn stream(
+        &self,
+        prepared: &Prepared,
+        cache: CacheUse,
+        generation: u64,
+        is_final: bool,
+    ) -> Result<bool, Diagnostics> {
         let Prepared { scene, plan, setup, .. } = prepared;
         let RenderSettings { size, samples, .. } = *scene.render();
         let whole = PixelRect::of_size(size);
         let counts: usize = plan.layers.iter().map(|layer| layer.channels().len()).sum();
         let channels = Mutex::new(vec![vec![0.0; whole.pixels()]; counts]);
-        let progress = |share: f64| self.tell(&Event::Progress { generation, samples, share });
+        let steps = AtomicU32::new(0);
+        let progress = |share: f64| self.tell_progress(&steps, generation, samples, share);
         let control = Control { cancel: Some(&self.cancel), progress: Some(&progress) };
         let options = RenderOptions { threads: self.options.threads, tile: self.options.tile, ..Default::default() };
         let put = |tile: &FilmTile| {
@@ -409,6 +482,7 @@ impl Shared {
                 channels: channels.into_inner().unwrap_or_else(PoisonError::into_inner),
                 changed: whole,
                 redone: Redone::everything(scene),
+                cache,
                 stats: report.stats,
                 warnings: report.warnings,
                 script_errors: report.script_errors,
@@ -420,25 +494,30 @@ impl Shared {
 
 /// Longer than this, in seconds, nobody should wait for a picture: one of fewer samples comes first.
 const PATIENCE: f64 = 0.3;
+/// In how many steps the progress of a picture is told.
+const PROGRESS_STEPS: f64 = 64.0;
+/// A picture that takes fewer seconds than this is made at once, even if all is to be traced.
+const AT_ONCE: f64 = 0.15;
+/// In so many seconds the next picture of more samples should come, if it can be done with twice as many or more.
+const NEXT_WITHIN: f64 = 1.0;
+
+/// How many samples per pixel come after those of a picture that is up to date: at least twice as many, and as many as
+/// can be had soon.
+fn next_rung(stages: &Stages, last: u32, size: [u32; 2]) -> u32 {
+    let mut samples = stages.samples().saturating_mul(2);
+    while samples < last && stages.seconds_at(samples.saturating_mul(2).min(last), size) <= NEXT_WITHIN {
+        samples = samples.saturating_mul(2);
+    }
+    samples.min(last)
+}
 
 /// About what a sample takes in memory with and without what its rays met, before anything was measured.
 const BYTES_PER_SAMPLE: [u64; 2] = [160, 90];
 
 /// What the worker keeps between setups.
 #[derive(Default)]
-struct Kept {
+struct Memory {
     stages: Option<Stages>,
     /// Whether the picture that was shown last is theirs.
     shown: bool,
-}
-
-/// What is kept of a picture.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Cache {
-    /// Samples, lines and what rays met.
-    All,
-    /// Not what rays met.
-    Samples,
-    /// No more than the picture.
-    Nothing,
 }

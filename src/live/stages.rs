@@ -42,7 +42,9 @@ impl Prepared {
         let mut builder = setup.scene.clone().into_builder();
         builder.render.samples = samples;
         let scene = builder.build()?;
-        let plan = Plan::new(&scene, &setup.shaders, &setup.layers);
+        let mut plan = Plan::new(&scene, &setup.shaders, &setup.layers);
+        // Kept whether or not the lines of this picture are tinted, so that to tint them takes the line pass alone.
+        plan.layout.columns.throughput |= plan.lines.is_some() && plan.has_secondary_rays();
         let clock = CpuClock::process();
         let view = View { scene: &scene, shaders: &setup.shaders, plan: &plan };
         let world = match older {
@@ -128,6 +130,8 @@ const CAMERA_RECORD_BYTES: u64 = 24;
 struct Sampled {
     /// Whether lines may look otherwise.
     changed: bool,
+    /// Whether the tile's own lines may, and no others.
+    own_lines_changed: bool,
     /// Whether pixels may, even with the same lines.
     pixels_changed: bool,
     traced: bool,
@@ -151,10 +155,39 @@ pub(super) struct Stages {
     reach: [i32; 2],
     /// What of the picture has changed since it was last up to date.
     changed: Option<PixelRect>,
-    /// Seconds that everything took.
-    full_seconds: f64,
+    pace: Pace,
     /// Whether what rays met is kept.
     keeps_records: bool,
+}
+
+/// How long samples of a tile took when they were last worked out, on all threads together: wall seconds.
+#[derive(Clone, Copy, Debug, Default)]
+struct Pace {
+    /// With all rays traced; 0 before any was.
+    trace: f64,
+    /// With rays that were known; 0 before.
+    shade: f64,
+}
+
+impl Pace {
+    /// About what shading takes of tracing, before it was measured.
+    const SHADE_OF_TRACE: f64 = 0.4;
+
+    fn note(&mut self, seconds: f64, sampled: &[(usize, Sampled)]) {
+        let per_tile = seconds / sampled.len().max(1) as f64;
+        let all = |what: fn(&Sampled) -> bool| !sampled.is_empty() && sampled.iter().all(|(_, sampled)| what(sampled));
+        if all(|sampled| sampled.traced) {
+            self.trace = per_tile;
+        } else if all(|sampled| sampled.shaded) {
+            self.shade = per_tile;
+        }
+    }
+
+    /// Seconds for so many tiles of each kind.
+    fn seconds(&self, traced: usize, shaded: usize) -> f64 {
+        let shade = if self.shade > 0.0 { self.shade } else { self.trace * Self::SHADE_OF_TRACE };
+        traced as f64 * self.trace + shaded as f64 * shade
+    }
 }
 
 /// A picture that is up to date.
@@ -178,7 +211,7 @@ impl Stages {
             channels: Vec::new(),
             reach: [0; 2],
             changed: None,
-            full_seconds: 0.0,
+            pace: Pace::default(),
             keeps_records,
         };
         stages.make_room();
@@ -192,6 +225,11 @@ impl Stages {
 
     pub fn samples(&self) -> u32 {
         self.prepared.scene.render().samples
+    }
+
+    /// Whether what rays met is kept.
+    pub fn keeps_records(&self) -> bool {
+        self.keeps_records
     }
 
     pub fn channels(&self) -> &[Vec<f32>] {
@@ -213,19 +251,27 @@ impl Stages {
         Redo::between(self.prepared.view(), prepared.view())
     }
 
-    /// About how many seconds shading takes that `redo` asks for, with what was left over from before.
-    pub fn seconds_to_shade(&self, redo: &Redo) -> f64 {
-        self.full_seconds * self.share_to_shade(redo)
-    }
-
-    /// The share of the tiles that must be shaded or traced for `redo`, with what was left over from before.
-    fn share_to_shade(&self, redo: &Redo) -> f64 {
-        let due = |tile: &&Tile| {
+    /// About how many seconds it takes to bring the samples up to date with `redo`, and with what was left over from
+    /// before.
+    pub fn seconds_for(&self, redo: &Redo) -> f64 {
+        let (mut traced, mut shaded) = (0, 0);
+        for tile in &self.tiles {
             let mut redo = redo.of_tile(|id| sees(tile, id));
             redo.add(&tile.redo);
-            redo.trace || redo.shade || !redo.shade_materials.is_empty()
-        };
-        self.tiles.iter().filter(due).count() as f64 / self.tiles.len().max(1) as f64
+            if redo.trace || tile.record.is_none() && redo.shades() {
+                traced += 1;
+            } else if redo.shades() {
+                shaded += 1;
+            }
+        }
+        self.pace.seconds(traced, shaded)
+    }
+
+    /// About how many seconds all samples take with so many of them in a pixel, in a picture of this many pixels.
+    pub fn seconds_at(&self, samples: u32, size: [u32; 2]) -> f64 {
+        let own = self.grid.region.pixels() as f64 * f64::from(self.samples());
+        let others = PixelRect::of_size(size).pixels() as f64 * f64::from(samples);
+        self.pace.seconds(self.tiles.len(), 0) * others / own.max(1.0)
     }
 
     /// Notes what leads to a setup of the same size and number of samples; the setup is the one to come.
@@ -288,6 +334,7 @@ impl Stages {
                 Some((index, sampled))
             })
             .collect();
+        self.pace.note(start.elapsed().as_secs_f64(), &sampled);
         for (index, sampled) in &sampled {
             redone.traced += usize::from(sampled.traced);
             redone.shaded += usize::from(sampled.shaded);
@@ -299,6 +346,7 @@ impl Stages {
             totals.seconds.lines += sampled.line_seconds;
             totals.hits.iter_mut().zip(&sampled.hits).for_each(|(total, hits)| *total += hits);
             totals.shade_seconds.iter_mut().zip(&sampled.shade_seconds).for_each(|(total, own)| *total += own);
+            self.tiles[*index].lines_due |= sampled.own_lines_changed;
             if sampled.changed {
                 for near in self.grid.around(*index, self.reach[0]).tiles {
                     self.tiles[near].lines_due = true;
@@ -375,9 +423,6 @@ impl Stages {
         }
         self.reach = [0; 2];
         self.widen_reach();
-        if redone.traced == redone.tiles {
-            self.full_seconds = start.elapsed().as_secs_f64();
-        }
         totals.seconds.total = start.elapsed().as_secs_f64();
         Some(self.outcome(totals, redone))
     }
@@ -486,7 +531,7 @@ fn bring_up_to_date(
 ) -> Sampled {
     let redo = std::mem::take(&mut tile.redo);
     let mut sampled = Sampled::default();
-    let mut shade = redo.trace || redo.shade || redo.visibility || !redo.shade_materials.is_empty();
+    let mut shade = redo.trace || redo.shades();
     if !shade && !redo.restyle.is_empty() {
         shade = !restyle(tile, &redo, prepared, tracer, contexts, &mut sampled);
     }
@@ -501,19 +546,24 @@ fn bring_up_to_date(
             record
         });
         contexts.with(|context| {
-            let memory = Memory { known: known.as_ref(), keep: keeps_record };
+            let memory = Memory::new(known.as_ref(), keeps_record);
             let traced = tracer.trace_with(rect, context, memory);
             tile.errors = std::mem::take(&mut context.errors);
-            sampled.changed = tile.samples.as_deref() != Some(&traced.samples);
-            sampled.pixels_changed = sampled.changed;
-            sampled.traced = known.is_none();
-            sampled.shaded = known.is_some();
+            let (new, old) = (&traced.samples, tile.samples.as_deref());
+            let lit_lines = prepared.plan.lines.as_ref().is_some_and(|lines| lines.rules.read_light());
+            sampled.pixels_changed = old != Some(new);
+            sampled.changed = sampled.pixels_changed
+                && old.is_none_or(|old| (lit_lines && old.paths != new.paths) || !old.same_nodes(new));
+            // Lines that let the sample's colour through have it mixed in.
+            let covered = || tile.lines.as_ref().is_none_or(|lines| lines.lines.iter().all(|line| line.covers));
+            sampled.own_lines_changed = old.is_none_or(|old| !old.same_colors(new)) && !covered();
+            (sampled.traced, sampled.shaded) = (known.is_none(), known.is_some());
             sampled.rays += traced.rays;
             sampled.seconds += traced.seconds;
             sampled.shade_seconds = traced.shade_seconds;
             sampled.hits.clone_from(&traced.hits);
             tile.hits = traced.hits;
-            tile.record = traced.record;
+            tile.record = traced.record.or(known.filter(|_| keeps_record));
             tile.samples = Some(Box::new(traced.samples));
         });
     }

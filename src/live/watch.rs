@@ -15,7 +15,7 @@ use super::follow::{Follower, Touched};
 use super::outputs::Outputs;
 use super::server::{PageOptions, Server};
 use super::tev::Tev;
-use super::{Event, LivePicture, Session, SessionOptions};
+use super::{CacheUse, Event, LivePicture, Session, SessionOptions};
 use crate::diag::{Diagnostic, Diagnostics};
 use crate::render::SceneRequest;
 
@@ -70,6 +70,8 @@ pub enum News {
     },
     /// A script failed at some hits of the last picture; told once for the same errors.
     ScriptErrors(Diagnostics),
+    /// The memory limit leaves room for less of the picture than before, or for more.
+    Memory(CacheUse),
     /// A picture file was written.
     Wrote(PathBuf),
     /// A picture file could not be written, files cannot be followed as usual, or a viewer has gone away.

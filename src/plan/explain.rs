@@ -3,7 +3,7 @@
 use super::{MaterialPlan, Plan, drawing_materials, refracts};
 use crate::scene::Scene;
 use crate::scene::ids::MaterialId;
-use crate::scene::settings::{Background, FilterKind, LineSettings, LineType, RayKinds};
+use crate::scene::settings::{Background, FilterKind, LineSettings, LineType, RayKinds, RenderSettings, Sampler};
 use crate::shade::Shaders;
 
 pub(super) fn explain(plan: &Plan, scene: &Scene, shaders: &Shaders) -> String {
@@ -13,7 +13,7 @@ pub(super) fn explain(plan: &Plan, scene: &Scene, shaders: &Shaders) -> String {
     };
     let settings = scene.render();
     let [width, height] = settings.size;
-    row("picture", format!("{width} x {height}, {} samples per pixel", settings.samples));
+    row("picture", format!("{width} x {height}, {} samples per pixel", samples_name(settings)));
     row("filter", format!("{}, radius {} px", filter_name(settings.filter), settings.filter_radius));
     row("objects", format!("{} over {} triangles", scene.objects().len(), scene.triangle_count()));
     row("background", background_name(&settings.background).into());
@@ -265,6 +265,14 @@ fn shorten(names: &[&str]) -> String {
 /// The last part of a script's path: the same text wherever the scene lies.
 fn short_script_name(name: &str) -> &str {
     name.rsplit(['/', '\\']).next().unwrap_or(name)
+}
+
+/// How many samples, and how they are spread if not as they are by default.
+fn samples_name(settings: &RenderSettings) -> String {
+    match settings.sampler {
+        Sampler::Stratified => settings.samples.to_string(),
+        other => format!("{} {}", settings.samples, other.name()),
+    }
 }
 
 pub(crate) fn filter_name(kind: FilterKind) -> &'static str {

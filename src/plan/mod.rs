@@ -214,6 +214,12 @@ impl Plan {
         self.materials.iter().any(|material| material.used && (material.lights || material.behind.lights))
     }
 
+    /// Whether no surface in a list can turn out to be invisible, so that lists depend on no shader.
+    #[must_use]
+    pub fn lists_are_opaque(&self) -> bool {
+        self.bodies.is_empty() && !self.materials.iter().any(|material| material.used && material.see_through)
+    }
+
     /// Whether any ray but those of the camera may be traced along a path.
     #[must_use]
     pub fn has_secondary_rays(&self) -> bool {
@@ -359,7 +365,9 @@ fn plan_lines(scene: &Scene, shaders: &Shaders, layers: &[Layer]) -> Option<Line
     for id in settings.hidden.iter_mut().flat_map(|hidden| hidden.objects.iter_mut().flatten()) {
         *id = stand_ins.get(id.index()).copied().unwrap_or(*id);
     }
-    let rules = Rules::new(&settings, scene.render().samples).with_widest(widest).with_materials(&overrides);
+    let render = scene.render();
+    let rules = Rules::for_sampler(&settings, render.sampler, render.samples);
+    let rules = rules.with_widest(widest).with_materials(&overrides);
     let scripts: Vec<_> = shaders
         .iter()
         .zip(&draws)

@@ -18,6 +18,9 @@
 //! All blocks are rendered at [`FIRST`] samples and at twice as many. With RMS errors e that fall as N^−0.75, as those of
 //! stratified samples at edges do (measured: −0.77), and with patterns that know nothing of each other, two pictures of rates
 //! a < b differ by d² = e_a² + e_b² in the mean, so that the error of the better one is e_b ≈ d · s / √(1 + s²), s = (a / b)^0.75.
+//! The sequences of the other samplers begin alike at every rate: the better picture holds the samples of the other, its errors are
+//! those that all its parts share, and d² = e_a² − e_b², so the sum under the root becomes a difference.
+//!
 //! d is the root mean square over the pixels of the block: that of the three colours as a screen shows them (linear, 0 … 1, what
 //! is transparent before white) or that of the coverage of lines, whichever is greater. If the estimate is at most E, the block
 //! is done; else it is rendered at the rate that should suffice, but at most four times as many samples, and looked at again.
@@ -39,6 +42,7 @@ use crate::film::{FilmTile, Layer};
 use crate::plan::Plan;
 use crate::sample::PixelRect;
 use crate::scene::Scene;
+use crate::scene::settings::Sampler;
 use crate::shade::{ShadeErrors, Shaders};
 
 /// Side of a block in pixels.
@@ -99,11 +103,12 @@ pub fn measured_layers(layers: &[Layer]) -> Vec<Layer> {
     all
 }
 
-/// The error of the better of two pictures of a block, estimated from what they differ by.
+/// The error of the better of two pictures of a block, estimated from what they differ by; see the module.
 #[must_use]
-pub fn estimate(difference: f64, rates: [u32; 2]) -> f64 {
+pub fn estimate(difference: f64, rates: [u32; 2], sampler: Sampler) -> f64 {
     let ratio = libm::pow(f64::from(rates[0]) / f64::from(rates[1]), SLOPE);
-    difference * ratio / (1.0 + ratio * ratio).sqrt()
+    let shared = if sampler == Sampler::Stratified { 1.0 } else { -1.0 };
+    difference * ratio / (1.0 + shared * ratio * ratio).sqrt()
 }
 
 /// The rate that a block needs next if its error at a rate is estimated to be this; `None` if it is done.
@@ -146,7 +151,7 @@ pub fn render_to_error(
         // Whole blocks are looked at, so that a crop comes out as in the whole picture.
         let whole = whole_blocks(crop).intersection(&picture);
         let all = Mask::new(scene.render().size, whole, BLOCK, |_| true);
-        let mut course = Course::new(goal, &all, Canvas::new(whole, &plan.layers));
+        let mut course = Course::new(goal, scene.render().sampler, &all, Canvas::new(whole, &plan.layers));
         let emit = |course: &Course<'_>, block: usize| {
             let rect = all.rect(block).intersection(&crop);
             if rect.pixels() > 0 { emit(&course.canvas.tile(rect)) } else { Ok(()) }
@@ -204,6 +209,7 @@ fn whole_blocks(rect: PixelRect) -> PixelRect {
 /// How far the blocks of a picture are.
 struct Course<'a> {
     goal: &'a ErrorGoal,
+    sampler: Sampler,
     all: &'a Mask,
     /// What is known of the picture.
     canvas: Canvas,
@@ -216,11 +222,11 @@ struct Course<'a> {
 }
 
 impl<'a> Course<'a> {
-    fn new(goal: &'a ErrorGoal, all: &'a Mask, canvas: Canvas) -> Self {
+    fn new(goal: &'a ErrorGoal, sampler: Sampler, all: &'a Mask, canvas: Canvas) -> Self {
         let blocks: Vec<usize> = all.blocks().collect();
         let count = blocks.last().map_or(0, |last| last + 1);
         let waiting = if blocks.is_empty() { BTreeMap::new() } else { BTreeMap::from([(FIRST, blocks)]) };
-        Self { goal, all, canvas, rates: vec![0; count], errors: vec![f64::INFINITY; count], waiting }
+        Self { goal, sampler, all, canvas, rates: vec![0; count], errors: vec![f64::INFINITY; count], waiting }
     }
 
     /// Takes in what a pass made of some blocks; returns those that are done.
@@ -232,7 +238,7 @@ impl<'a> Course<'a> {
             let next = if before == 0 {
                 Some(rate.saturating_mul(2))
             } else {
-                self.errors[block] = estimate(self.canvas.difference(fresh, rect), [before, rate]);
+                self.errors[block] = estimate(self.canvas.difference(fresh, rect), [before, rate], self.sampler);
                 next_rate(self.goal, rate, self.errors[block])
             };
             self.canvas.put(&fresh.tile(rect));
@@ -345,9 +351,11 @@ mod tests {
         for (a, b) in [(4, 8), (8, 32), (16, 64)] {
             let [ea, eb] = [a, b].map(|rate: u32| 0.3 * libm::pow(f64::from(rate), -0.75));
             let difference = (ea * ea + eb * eb).sqrt();
-            assert!((estimate(difference, [a, b]) - eb).abs() < 1e-12);
+            assert!((estimate(difference, [a, b], Sampler::Stratified) - eb).abs() < 1e-12);
+            let difference = (ea * ea - eb * eb).sqrt();
+            assert!((estimate(difference, [a, b], Sampler::Sobol) - eb).abs() < 1e-12);
         }
-        assert_eq!(estimate(0.0, [4, 8]), 0.0);
+        assert_eq!(estimate(0.0, [4, 8], Sampler::Stratified), 0.0);
     }
 
     #[test]

@@ -89,6 +89,21 @@ impl Camera {
         }
     }
 
+    /// Where a point of the world lies on the film of a picture of `size` pixels, in pixels from its upper left corner; `None` if it
+    /// is not before the camera.
+    #[must_use]
+    pub fn film_position(&self, size: [u32; 2], world: DVec3) -> Option<DVec2> {
+        let seen = self.world_from_camera.transpose() * (world - self.position);
+        let half_view = match self.projection {
+            Projection::Perspective { fov_y } if seen.z < 0.0 => -seen.z * libm::tan(fov_y / 2.0),
+            Projection::Perspective { .. } => return None,
+            Projection::Orthographic { height } => height / 2.0,
+        };
+        let [width, height] = size.map(f64::from);
+        let scale = height / 2.0 / half_view;
+        Some(DVec2::new(width / 2.0 + seen.x * scale, height / 2.0 - seen.y * scale) - self.film_shift)
+    }
+
     /// The angle between the rays of neighbouring pixels in the middle of the picture (radians; 0 if parallel) and
     /// the distance between their origins (world units; 0 if they meet).
     #[must_use]

@@ -14,10 +14,12 @@ pub mod light;
 mod lookup;
 pub mod material;
 pub mod mesh;
+pub mod mesh_file;
 pub mod script_files;
 pub mod settings;
 pub mod shape;
 pub mod texture;
+pub mod truth;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -32,6 +34,7 @@ use material::{Material, Script, ScriptFiles};
 use mesh::Mesh;
 use settings::{LineSettings, RayKinds, RenderSettings};
 use texture::Texture;
+use truth::Truth;
 
 /// A mesh with a place in the world and materials.
 #[derive(Clone, Debug)]
@@ -152,6 +155,12 @@ impl Scene {
         &self.parts.lights
     }
 
+    /// `[truth]`: the lines that the picture must show, if the scene declares them.
+    #[must_use]
+    pub fn truth(&self) -> Option<&Truth> {
+        self.parts.truth.as_ref()
+    }
+
     /// The scene's time in seconds: what animations were posed at, and `hit.time`.
     #[must_use]
     pub fn time(&self) -> f32 {
@@ -208,6 +217,8 @@ pub struct SceneBuilder {
     pub textures: Vec<Arc<Texture>>,
     /// All lights.
     pub lights: Vec<Light>,
+    /// `[truth]`: the lines that the picture must show.
+    pub truth: Option<Truth>,
 }
 
 impl SceneBuilder {

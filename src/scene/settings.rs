@@ -1,6 +1,7 @@
 //! Picture, background and line settings, all resolved: no later stage knows that a value was optional.
 
 use bitflags::bitflags;
+use serde::{Deserialize, Serialize};
 
 use super::ids::{ObjectId, TextureId};
 use crate::math::Vec3;
@@ -20,6 +21,34 @@ pub enum FilterKind {
     BlackmanHarris,
 }
 
+/// How samples are spread over a pixel.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Sampler {
+    /// Each somewhere in a cell of its own.
+    #[default]
+    Stratified,
+    /// Points of an Owen-scrambled Sobol sequence, another scrambling for each pixel.
+    Sobol,
+    /// The same from one sequence for all pixels, so that neighbours make up for each other's errors.
+    BlueNoise,
+}
+
+impl Sampler {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Stratified, Self::Sobol, Self::BlueNoise];
+
+    /// As scene files and tables call it.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Stratified => "stratified",
+            Self::Sobol => "sobol",
+            Self::BlueNoise => "blue-noise",
+        }
+    }
+}
+
 /// `[render]`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RenderSettings {
@@ -27,6 +56,8 @@ pub struct RenderSettings {
     pub size: [u32; 2],
     /// Samples per pixel, at least 1.
     pub samples: u32,
+    /// How they are spread over the pixel.
+    pub sampler: Sampler,
     /// Chooses the sample positions.
     pub seed: u64,
     /// What rays that leave the scene see.
@@ -48,6 +79,7 @@ impl Default for RenderSettings {
         Self {
             size: [1280, 720],
             samples: 16,
+            sampler: Sampler::Stratified,
             seed: 0,
             background: Background::Color(Vec3::splat(0.9)),
             ambient: Vec3::splat(0.2),

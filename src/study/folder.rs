@@ -56,6 +56,12 @@ impl Folder {
         self.path.join("study.csv")
     }
 
+    /// `widths.csv`.
+    #[must_use]
+    pub fn widths(&self) -> PathBuf {
+        self.path.join("widths.csv")
+    }
+
     /// A file of this name.
     #[must_use]
     pub fn file(&self, name: &str) -> PathBuf {

@@ -7,7 +7,7 @@ use crate::film::Layer;
 use crate::line::Method;
 use crate::plan::{Plan, bounds, drawing_materials, filter_name};
 use crate::scene::ids::MaterialId;
-use crate::scene::settings::{FilterKind, LineSettings};
+use crate::scene::settings::{FilterKind, LineSettings, Sampler};
 use crate::scene::{Scene, SceneBuilder};
 use crate::shade::{OutputSet, Shaders};
 
@@ -20,6 +20,8 @@ pub enum Knob {
     IdealSamples,
     /// How lines are found.
     Method,
+    /// How samples are spread over a pixel, at several rates.
+    Sampler,
     /// The minimum width of lines.
     MinWidth,
     /// Whether widths are corrected for thinning.
@@ -36,9 +38,10 @@ pub enum Knob {
 
 impl Knob {
     /// All of them, the most telling first.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::Samples,
         Self::Method,
+        Self::Sampler,
         Self::IdealSamples,
         Self::MinWidth,
         Self::WidthCompensation,
@@ -55,6 +58,7 @@ impl Knob {
             Self::Samples => "samples",
             Self::IdealSamples => "ideal_samples",
             Self::Method => "method",
+            Self::Sampler => "sampler",
             Self::MinWidth => "min_width",
             Self::WidthCompensation => "width_compensation",
             Self::Surfaces => "surfaces",
@@ -84,6 +88,8 @@ impl std::str::FromStr for Knob {
 pub struct Settings {
     /// Samples per pixel.
     pub samples: u32,
+    /// How they are spread over a pixel.
+    pub sampler: Sampler,
     /// How lines are found.
     pub method: Method,
     /// Minimum width in pixels.
@@ -109,6 +115,7 @@ impl Settings {
         let (render, lines) = (scene.render(), scene.lines());
         Self {
             samples: render.samples,
+            sampler: render.sampler,
             method: Method::Exact,
             min_width: lines.min_width,
             width_compensation: lines.width_compensation,
@@ -124,6 +131,7 @@ impl Settings {
     pub fn apply(&self, scene: &mut SceneBuilder) {
         let (render, lines) = (&mut scene.render, &mut scene.lines);
         render.samples = self.samples;
+        render.sampler = self.sampler;
         render.reflection_depth = self.reflection_depth;
         render.refraction_depth = self.refraction_depth;
         render.filter = self.filter;
@@ -139,6 +147,7 @@ impl Settings {
         match knob {
             Knob::Samples | Knob::IdealSamples => self.samples.to_string(),
             Knob::Method => method_name(self.method).to_owned(),
+            Knob::Sampler => format!("{} {}", self.sampler.name(), self.samples),
             Knob::MinWidth => self.min_width.to_string(),
             Knob::WidthCompensation => if self.width_compensation { "on" } else { "off" }.to_owned(),
             Knob::Surfaces => self.surfaces.to_string(),
@@ -186,6 +195,8 @@ pub struct Ladder {
 
 /// Counts that are plainly jittered.
 const SAMPLES: [u32; 8] = [1, 2, 4, 9, 16, 36, 64, 144];
+/// Counts that suit every sampler.
+const SAMPLER_SAMPLES: [u32; 3] = [4, 16, 64];
 
 impl Ladder {
     /// The ladder of a scene, of the knobs that are asked for.
@@ -335,6 +346,11 @@ fn rungs(
         Knob::Method => {
             [Method::Exact, Method::Choudhury, Method::Bauer].map(|method| Settings { method, ..*own }).to_vec()
         }
+        Knob::Sampler => {
+            let all = counts(&SAMPLER_SAMPLES, own.samples);
+            let at = |sampler| all.iter().map(move |samples| Settings { sampler, samples: *samples, ..*own });
+            Sampler::ALL.into_iter().flat_map(at).collect()
+        }
         Knob::MinWidth => {
             if least_width(scene, shaders) >= own.min_width.max(1.0) {
                 return Err("no line is thin");
@@ -413,7 +429,7 @@ impl fmt::Display for Ladder {
                 let value = self.points[*point].value(*knob);
                 if *point == 0 { format!("[{value}]") } else { value }
             });
-            let separator = if *knob == Knob::Filter { ", " } else { " " };
+            let separator = if matches!(knob, Knob::Filter | Knob::Sampler) { ", " } else { " " };
             writeln!(f, "{:<20}{}", knob.name(), values.collect::<Vec<_>>().join(separator))?;
         }
         for (knob, why) in &self.left_out {

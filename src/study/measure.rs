@@ -163,12 +163,11 @@ impl Reference {
             (0..3).map(|axis| difference(axis) * difference(axis)).sum::<f64>() / 3.0
         };
         let flip = flip(reference.width, &reference.colors, &test.colors, PIXELS_PER_DEGREE);
-        let ink: f64 = reference.coverage.iter().map(|coverage| f64::from(*coverage)).sum();
-        let wrong = reference.coverage.iter().zip(&test.coverage).map(|(a, b)| (f64::from(*a) - f64::from(*b)).abs());
+        let has_ink = reference.coverage.iter().any(|coverage| *coverage > 0.0);
         Errors {
             rmse: ByRegion::of(regions, square, f64::sqrt),
             flip: ByRegion::of(regions, |i| f64::from(flip[i]), |mean| mean),
-            coverage: (ink > 0.0).then(|| wrong.sum::<f64>() / ink),
+            coverage: has_ink.then(|| wrong_share(&reference.coverage, &test.coverage)),
             position: self.position(&test.coverage),
         }
     }
@@ -203,6 +202,13 @@ impl Reference {
         }
         moments
     }
+}
+
+/// Σ |coverage − reference| / Σ reference; infinite or no number if the reference has no lines.
+pub(super) fn wrong_share(reference: &[f32], test: &[f32]) -> f64 {
+    let ink: f64 = reference.iter().map(|coverage| f64::from(*coverage)).sum();
+    let wrong = reference.iter().zip(test).map(|(a, b)| (f64::from(*a) - f64::from(*b)).abs());
+    wrong.sum::<f64>() / ink
 }
 
 /// Which pixels are within one of a line's.

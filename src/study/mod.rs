@@ -13,6 +13,8 @@ pub mod quality;
 pub mod report;
 pub mod run;
 pub mod table;
+pub mod truth;
+pub mod width;
 
 pub use flicker::{Flicker, FlickerOptions, flicker};
 pub use flip::{flip, mean_flip};

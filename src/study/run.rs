@@ -6,12 +6,16 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
+use rayon::prelude::*;
+
 use super::flip::shown;
 use super::folder::Folder;
 use super::ladder::{Knob, Ladder, Settings};
-use super::measure::{Errors, Reference, Shot};
+use super::measure::{Errors, Reference, Shot, wrong_share};
 use super::table::{self, Run};
-use crate::diag::{Diagnostic, Diagnostics};
+use super::truth::coverage;
+use super::width::{self, Drawn};
+use crate::diag::{Diagnostic, Diagnostics, Span};
 use crate::film::{FilmTile, Layer, LinePath};
 use crate::plan::Plan;
 use crate::render::stats::{Stats, reset_peak_memory};
@@ -32,14 +36,23 @@ pub struct StudyOptions {
     pub reference: u32,
     /// The most time to take; points that do not fit are left out, the least telling first.
     pub budget: Option<Duration>,
+    /// Whether to measure how wide lines are drawn, too, if the scene declares lines.
+    pub widths: bool,
     /// Threads; 0 for as many as the machine has.
     pub threads: usize,
 }
 
 impl Default for StudyOptions {
     fn default() -> Self {
-        let knobs = Knob::ALL.to_vec();
-        Self { title: "scene".to_owned(), knobs, repeats: 3, reference: 1024, budget: None, threads: 0 }
+        Self {
+            title: "scene".to_owned(),
+            knobs: Knob::ALL.to_vec(),
+            repeats: 3,
+            reference: 1024,
+            budget: None,
+            widths: true,
+            threads: 0,
+        }
     }
 }
 
@@ -54,8 +67,12 @@ pub struct Study {
     pub ladder: Ladder,
     /// Samples per pixel of the reference.
     pub reference: u32,
-    /// The reference's own errors, estimated from its two halves.
+    /// The reference's own errors, estimated from its two halves; what the scene declares has none.
     pub own: Errors,
+    /// Whether lines are compared with those that the scene declares.
+    pub truth: bool,
+    /// How wide lines are drawn, if the scene declares lines.
+    pub widths: Vec<Drawn>,
     /// Every picture of this ladder that was measured, by point.
     pub runs: Vec<Vec<Run>>,
     /// Pictures that were to be measured and were not, for want of time.
@@ -74,6 +91,16 @@ pub struct StudyControl<'a> {
     pub cancel: Option<&'a AtomicBool>,
     /// Follows it.
     pub progress: Option<Progress<'a>>,
+}
+
+impl StudyControl<'_> {
+    fn is_cancelled(&self) -> bool {
+        self.cancel.is_some_and(|cancel| cancel.load(Ordering::Relaxed))
+    }
+
+    fn say(&self, share: f64, what: &str) {
+        self.progress.iter().for_each(|progress| progress(share, what));
+    }
 }
 
 /// Studies a scene into a folder: `study.csv`, the reference and the pictures. What the folder already holds of the same
@@ -97,8 +124,12 @@ pub fn study(
         return Err(fault.hint("`tusche explain` says why").into());
     };
     let folder = Folder::open(folder)?;
-    let known = table::read(&folder.table())?;
+    let known: Vec<Run> = table::read(&folder.table())?;
     let camera = Camera {
+        truth: scene.truth().map(|truth| Declared {
+            coverage: coverage(truth, scene.camera(), scene.render().size, &plan.filter),
+            span: truth.span.clone(),
+        }),
         key: key(&scene),
         seed: scene.render().seed,
         size: scene.render().size,
@@ -108,7 +139,6 @@ pub fn study(
         threads: options.threads,
         cancel: control.cancel,
     };
-    let say = |share: f64, what: &str| control.progress.iter().for_each(|progress| progress(share, what));
     let deadline = options.budget.map(|budget| start + budget);
 
     // The scene's own picture tells what all others will take.
@@ -117,7 +147,7 @@ pub fn study(
     let per_sample = match known_seconds {
         Some(run) => run.wall_seconds,
         None => {
-            say(0.0, "the scene");
+            control.say(0.0, "the scene");
             let Some((shot, stats)) = camera.shoot(&ladder.points[0], 0)? else { return Err(stopped()) };
             first.insert((shot, stats)).1.seconds.total
         }
@@ -128,7 +158,7 @@ pub fn study(
         }
         _ => {
             let samples = reference_samples(options, ladder.points[0].samples, per_sample)?;
-            say(0.01, "the reference");
+            control.say(0.01, "the reference");
             let Some((shot, own)) = camera.reference(&ladder.ideal, samples, lines.widest)? else {
                 return Err(stopped());
             };
@@ -150,6 +180,8 @@ pub fn study(
             }
         }
     }
+    // Drawn widths come last.
+    let pictures = if options.widths && camera.truth.is_some() { 0.9 } else { 1.0 };
     let mut done = f64::from(samples);
     let all = done + waiting.iter().map(|(point, _)| f64::from(ladder.points[*point].samples)).sum::<f64>();
     let (mut left_out, mut complete) = (0, true);
@@ -163,7 +195,7 @@ pub fn study(
             left_out += 1;
             continue;
         }
-        say(done / all, &ladder.name(point));
+        control.say(done / all * pictures, &ladder.name(point));
         let shot = if taken.is_some() { taken } else { camera.shoot(settings, repeat)? };
         let Some((shot, stats)) = shot else {
             complete = false;
@@ -176,6 +208,15 @@ pub fn study(
         table::write(&folder.table(), &runs)?;
         done += f64::from(settings.samples);
     }
+    let measures_widths = options.widths && camera.truth.is_some();
+    let widths = if measures_widths && complete {
+        let (widths, missing) = drawn_widths(&folder, options.threads, deadline, control)?;
+        left_out += missing;
+        complete = !control.is_cancelled();
+        widths
+    } else {
+        Vec::new()
+    };
     let of_point = |settings: &Settings| runs.iter().filter(|run| run.is_of(settings)).cloned().collect();
     let runs = ladder.points.iter().map(of_point).collect();
     Ok(Study {
@@ -184,11 +225,41 @@ pub fn study(
         ladder,
         reference: samples,
         own,
+        truth: camera.truth.is_some(),
+        widths,
         runs,
         left_out,
         complete,
     })
 }
+
+/// How wide lines are drawn, and how many widths there was no time for.
+fn drawn_widths(
+    folder: &Folder,
+    threads: usize,
+    deadline: Option<Instant>,
+    control: &StudyControl<'_>,
+) -> Result<(Vec<Drawn>, usize), Diagnostics> {
+    let all = width::all();
+    let mut widths: Vec<Drawn> = table::read(&folder.widths())?;
+    widths.retain(|known| all.iter().any(|asked| known.is_of(asked)));
+    let missing: Vec<_> = all.iter().filter(|asked| !widths.iter().any(|known| known.is_of(asked))).collect();
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+    let pool = pool.map_err(|error| Diagnostic::error(format!("cannot start threads: {error}")))?;
+    for (number, part) in missing.chunks(WIDTHS_AT_ONCE).enumerate() {
+        if control.is_cancelled() || deadline.is_some_and(|deadline| deadline < Instant::now()) {
+            let done = number * WIDTHS_AT_ONCE;
+            return Ok((widths, missing.len() - done));
+        }
+        control.say(0.9 + 0.1 * (number * WIDTHS_AT_ONCE) as f64 / missing.len() as f64, "drawn widths");
+        widths.extend(pool.install(|| part.par_iter().map(|asked| Drawn::measure(asked)).collect::<Vec<_>>()));
+        table::write(&folder.widths(), &widths)?;
+    }
+    Ok((widths, 0))
+}
+
+/// How many drawn widths are measured between two looks at the clock.
+const WIDTHS_AT_ONCE: usize = 10;
 
 fn stopped() -> Diagnostics {
     let fault = Diagnostic::error("stopped before anything could be measured");
@@ -247,8 +318,18 @@ pub fn key(scene: &Scene) -> String {
     format!("h{:016x}", hash.0)
 }
 
+/// The lines that a scene declares.
+struct Declared {
+    coverage: Vec<f32>,
+    span: Option<Span>,
+}
+
+/// Less than this share of the lines' area need not mean that a scene declares other lines than it shows.
+const LEAST_DOUBT: f64 = 0.1;
+
 /// Takes pictures of one scene with changing settings.
 struct Camera<'a> {
+    truth: Option<Declared>,
     key: String,
     seed: u64,
     size: [u32; 2],
@@ -263,20 +344,43 @@ impl Camera<'_> {
     /// A picture with the seed of a repeat: the scene's own for the first. `None` if it was stopped.
     fn shoot(&self, settings: &Settings, repeat: u32) -> Result<Option<(Shot, Stats)>, Diagnostics> {
         let seed = if repeat == 0 { self.seed } else { self.unused_seed(u64::from(repeat) + 16) };
-        self.take(settings, seed, &[Layer::Rgba, Layer::Line])
+        let planes = self.take(settings, seed, &[Layer::Rgba, Layer::Line])?;
+        Ok(planes.map(|(planes, stats)| (shot(self.size[0] as usize, &planes, None), stats)))
     }
 
-    /// The mean of two halves, and its own errors: half of what they differ by.
+    /// The mean of two halves, and its own errors: half of what they differ by. Lines that the scene declares take the place of those
+    /// that were found.
+    ///
+    /// # Errors
+    /// If the scene shows other lines than it declares.
     fn reference(&self, ideal: &Settings, samples: u32, widest: f32) -> Result<Option<(Shot, Errors)>, Diagnostics> {
         let settings = Settings { samples: samples.div_ceil(2), ..*ideal };
         let mut layers = vec![Layer::Rgba, Layer::Line];
         if self.secondary {
             layers.extend([LinePath::Reflection, LinePath::Refraction].map(Layer::LinePath));
         }
-        let half = |purpose| self.take(&settings, self.unused_seed(purpose), &layers);
-        let (Some((a, _)), Some((b, _))) = (half(1)?, half(2)?) else { return Ok(None) };
+        let half = |purpose| {
+            let planes = self.take(&settings, self.unused_seed(purpose), &layers)?;
+            let declared = self.truth.as_ref().map(|truth| &truth.coverage[..]);
+            Ok::<_, Diagnostics>(planes.map(|(planes, _)| shot(self.size[0] as usize, &planes, declared)))
+        };
+        let (Some(a), Some(b)) = (half(1)?, half(2)?) else { return Ok(None) };
         let own = Reference::new(a.clone(), widest).errors(&b).scaled(0.5);
-        Ok(Some((Shot::mean(&a, &b), own)))
+        let mut shot = Shot::mean(&a, &b);
+        let Some(truth) = &self.truth else { return Ok(Some((shot, own))) };
+        let error = wrong_share(&truth.coverage, &shot.coverage);
+        if error > f64::max(LEAST_DOUBT, 3.0 * own.coverage.unwrap_or_default()) {
+            let message = format!(
+                "the picture shows other lines than `[truth]` declares: they differ by {:.0} % of the lines' area",
+                100.0 * error.min(10.0)
+            );
+            let fault = Diagnostic::error(message);
+            let fault = truth.span.iter().fold(fault, |fault, span| fault.at(span.clone()));
+            let hint = "declare all lines and no others, with their widths; pixels are those of the picture as it is rendered, `--size` included";
+            return Err(fault.hint(hint).into());
+        }
+        shot.coverage.clone_from(&truth.coverage);
+        Ok(Some((shot, Errors { coverage: None, position: None, ..own })))
     }
 
     /// Seeds that nobody chooses, so that no pattern is used for two purposes.
@@ -284,7 +388,8 @@ impl Camera<'_> {
         self.seed ^ (purpose << 40)
     }
 
-    fn take(&self, settings: &Settings, seed: u64, layers: &[Layer]) -> Result<Option<(Shot, Stats)>, Diagnostics> {
+    /// The channels of layers.
+    fn take(&self, settings: &Settings, seed: u64, layers: &[Layer]) -> Result<Option<(Planes, Stats)>, Diagnostics> {
         let mut builder = self.builder.clone();
         settings.apply(&mut builder);
         builder.render.seed = seed;
@@ -317,15 +422,29 @@ impl Camera<'_> {
             return Ok(None);
         }
         let planes = planes.into_inner().unwrap_or_else(PoisonError::into_inner);
-        Ok(Some((shot(width, &planes), report.stats)))
+        Ok(Some((planes, report.stats)))
     }
 }
 
-/// Planes of `rgba`, `line`, and perhaps the lines of two kinds of paths.
-fn shot(width: usize, planes: &[Vec<f32>]) -> Shot {
+/// Channels, each row by row.
+type Planes = Vec<Vec<f32>>;
+
+/// From planes of `rgba`, `line`, and perhaps the lines of two kinds of paths. Where it is declared how much lines cover, colours are
+/// as if they did; the coverage is that of the planes.
+fn shot(width: usize, planes: &[Vec<f32>], declared: Option<&[f32]>) -> Shot {
     let color = |i: usize| {
         let white = 1.0 - planes[3][i];
-        [0, 1, 2].map(|axis| shown(planes[axis][i] + white))
+        let found = [0, 1, 2].map(|axis| planes[axis][i] + white);
+        let alpha = planes[7][i];
+        // What is next to nothing has no colour.
+        let declared = declared.filter(|_| (0.001..=0.999).contains(&alpha)).map(|declared| declared[i]);
+        [0, 1, 2].map(|axis| {
+            let value = declared.map_or(found[axis], |declared| {
+                let [line, below] = [planes[4 + axis][i] / alpha, (found[axis] - planes[4 + axis][i]) / (1.0 - alpha)];
+                line * declared + below * (1.0 - declared)
+            });
+            shown(value)
+        })
     };
     let secondary = |reflection: &Vec<f32>, refraction: &Vec<f32>| {
         reflection.iter().zip(refraction).map(|(a, b)| (a + b).min(1.0)).collect()

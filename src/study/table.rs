@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
@@ -21,6 +22,8 @@ pub struct Run {
     /// Samples per pixel of the reference.
     pub reference: u32,
     pub samples: u32,
+    /// How they are spread over a pixel.
+    pub sampler: String,
     pub method: String,
     pub min_width: f32,
     pub width_compensation: bool,
@@ -64,6 +67,7 @@ impl Run {
             scene: identity.0.to_owned(),
             reference: identity.1,
             samples: settings.samples,
+            sampler: settings.sampler.name().to_owned(),
             method: method_name(settings.method).to_owned(),
             min_width: settings.min_width,
             width_compensation: settings.width_compensation,
@@ -99,6 +103,7 @@ impl Run {
     #[must_use]
     pub fn is_of(&self, settings: &Settings) -> bool {
         self.samples == settings.samples
+            && self.sampler == settings.sampler.name()
             && self.method == method_name(settings.method)
             && self.min_width == settings.min_width
             && self.width_compensation == settings.width_compensation
@@ -141,7 +146,7 @@ impl Run {
 ///
 /// # Errors
 /// If it cannot be read, or is no table of a study.
-pub fn read(path: &Path) -> Result<Vec<Run>, Diagnostic> {
+pub fn read<T: DeserializeOwned>(path: &Path) -> Result<Vec<T>, Diagnostic> {
     let text = match std::fs::read(path) {
         Ok(text) => text,
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
@@ -171,7 +176,7 @@ pub fn read(path: &Path) -> Result<Vec<Run>, Diagnostic> {
 ///
 /// # Errors
 /// If the file cannot be written.
-pub fn write(path: &Path, runs: &[Run]) -> Result<(), Diagnostic> {
+pub fn write<T: Serialize>(path: &Path, runs: &[T]) -> Result<(), Diagnostic> {
     let failed = |error: serde_json::Error| Diagnostic::error(format!("cannot write the table: {error}")).in_file(path);
     let mut text = String::new();
     for run in runs {

@@ -26,9 +26,9 @@ use crate::scene::settings::RayKinds;
 use crate::shade::Mode;
 use crate::shade::bsdf::unit;
 
-/// A hit behind the first, shaded: its node's number, its place in the list, and its attributes, or its triangle if it is not
-/// there.
-type Shaded = (u32, u32, Result<Node, Facet>);
+/// A hit behind the first, shaded: its node's number, its place in the list, itself, and its attributes, or its triangle if it
+/// is not there.
+type Shaded = (u32, u32, Hit, Result<Node, Facet>);
 
 impl Run {
     /// Forgets what lies behind hits that turned out invisible: their rays look for a new list.
@@ -84,11 +84,11 @@ impl TileTracer<'_> {
             for group in hits.chunk_by(|a, b| a.material == b.material) {
                 self.shade_group_behind(group, run, context, work, &mut shaded);
             }
-            shaded.sort_by_key(|&(node, place, _)| (node, place));
+            shaded.sort_by_key(|&(node, place, ..)| (node, place));
             let mut again = Vec::new();
             for list in shaded.chunk_by(|a, b| a.0 == b.0) {
                 let node = list[0].0;
-                let mut found_absent = list.iter().filter_map(|(_, _, found)| found.err()).peekable();
+                let mut found_absent = list.iter().filter_map(|(.., found)| found.err()).peekable();
                 if found_absent.peek().is_some() {
                     let absent = absent.entry(node).or_default();
                     absent.extend(found_absent);
@@ -98,7 +98,7 @@ impl TileTracer<'_> {
                     }
                 }
                 // Behind so many invisible surfaces nothing is looked for any more.
-                let there = list.iter().map_while(|&(node, place, found)| Some((node, place, found.ok()?)));
+                let there = list.iter().map_while(|&(node, place, hit, found)| Some((node, place, hit, found.ok()?)));
                 run.surfaces.extend(there);
             }
             let rays: Vec<WaveRay> = {
@@ -154,7 +154,7 @@ impl TileTracer<'_> {
             let opacity = unit(value(&batch.opacity, outputs.row, 1.0), 1.0);
             let cone = run.nodes[hit.ray.node as usize].cone;
             let found = if opacity == 0.0 { Err(hit.hit.facet()) } else { Ok(self.attributes(hit, cone, outputs)) };
-            shaded.push((hit.ray.node, hit.place, found));
+            shaded.push((hit.ray.node, hit.place, hit.hit, found));
         }
     }
 }

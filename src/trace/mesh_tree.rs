@@ -26,7 +26,7 @@ impl Block {
     #[inline(always)]
     pub fn triangle(&self, place: usize) -> Option<(u32, [Vec3; 3])> {
         let id = self.ids[place];
-        let corner = |vertex: &[Vec4; 3]| Vec3::from_array(vertex.map(|axis| axis.to_array()[place]));
+        let corner = |vertex: &[Vec4; 3]| Vec3::from_array(vertex.each_ref().map(|axis| axis.as_ref()[place]));
         (id != NONE).then(|| (id, self.corners.each_ref().map(corner)))
     }
 

@@ -35,10 +35,23 @@ fn max(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 
+/// Combines all lanes, half with half: one after the other they would wait for each other.
+#[inline(always)]
+fn combined(mut lanes: Lanes, combine: impl Fn(f32, f32) -> f32 + Copy) -> f32 {
+    let mut half = LANES / 2;
+    while half > 0 {
+        for i in 0..half {
+            lanes[i] = combine(lanes[i], lanes[i + half]);
+        }
+        half /= 2;
+    }
+    lanes[0]
+}
+
 /// The largest of all lanes.
 #[inline(always)]
 pub(super) fn largest(lanes: &Lanes) -> f32 {
-    lanes.iter().fold(f32::NEG_INFINITY, |largest, &lane| max(largest, lane))
+    combined(*lanes, max)
 }
 
 /// Vectors by axis, times a matrix.
@@ -101,6 +114,17 @@ impl LaneRays {
             lanes.iter_mut().for_each(|lane| *lane -= translation);
         }
         Self::new(product(object_from_world, &from), product(object_from_world, &self.direction))
+    }
+
+    /// The largest component of any ray's origin.
+    #[inline(always)]
+    pub fn largest_start(&self) -> f32 {
+        let [x, y, z] = &self.origin;
+        let mut lanes = [0.0; LANES];
+        for i in 0..LANES {
+            lanes[i] = max(max(x[i].abs(), y[i].abs()), z[i].abs());
+        }
+        largest(&lanes)
     }
 
     /// Where one of the rays starts.
@@ -167,7 +191,6 @@ impl LaneRays {
     /// Bounds on the distances of the slab test.
     #[inline(always)]
     pub fn bundle(&self) -> Bundle {
-        let bounds = |lanes: &Lanes| lanes.iter().fold((lanes[0], lanes[0]), |(a, b), &x| (min(a, x), max(b, x)));
         let mut bundle = Bundle {
             near: [0, 1, 2],
             far: [3, 4, 5],
@@ -176,8 +199,8 @@ impl LaneRays {
             mixed: [false; 3],
         };
         for axis in 0..3 {
-            let (low, high) = bounds(&self.origin[axis]);
-            let (least, most) = bounds(&self.inverse[axis]);
+            let (low, high) = (combined(self.origin[axis], min), largest(&self.origin[axis]));
+            let (least, most) = (combined(self.inverse[axis], min), largest(&self.inverse[axis]));
             bundle.mixed[axis] = least < 0.0 && most > 0.0;
             bundle.inverse[axis] = [least, most].map(Vec4::splat);
             bundle.origin[axis] = [high, low].map(Vec4::splat);

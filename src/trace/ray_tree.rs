@@ -121,8 +121,8 @@ pub(super) struct Run {
     pub next: Vec<WaveRay>,
     /// Hits behind the first ones of this wave.
     pub behind: Vec<WaveHit>,
-    /// What the line pass will see of surfaces behind the first: the node, the place in its list, and the attributes.
-    pub surfaces: Vec<(u32, u32, Node)>,
+    /// What the line pass will see of surfaces behind the first: the node, the place in its list, the hit, and the attributes.
+    pub surfaces: Vec<(u32, u32, Hit, Node)>,
     /// Media of its rays: the first is air.
     pub media: Vec<Media>,
     /// How rays of this wave pass surfaces of bodies.

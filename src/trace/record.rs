@@ -9,7 +9,7 @@ use super::cone::Cone;
 use super::ray_tree::{Run, TreeNode, WaveRay};
 use super::world::Hit;
 use crate::math::Vec3;
-use crate::sample::NodePath;
+use crate::sample::{Node, NodePath};
 use crate::scene::ids::ObjectId;
 
 /// What the rays of a tile met.
@@ -32,6 +32,21 @@ struct PathRecord {
     starts: Vec<Start>,
     /// What each hit sees of each light, [`UNKNOWN`] where nobody asked; empty if nobody ever did.
     visibility: Vec<f32>,
+    /// The second surfaces of lists, the third, and so on.
+    behind: Vec<BehindRecord>,
+}
+
+/// The hits at one place of the lists of a path, in the order of their samples.
+#[derive(Clone, Debug, Default)]
+struct BehindRecord {
+    samples: Vec<u32>,
+    met: Vec<PackedHit>,
+}
+
+impl BehindRecord {
+    fn hit(&self, sample: u32) -> Option<Hit> {
+        self.met[self.samples.binary_search(&sample).ok()?].hit()
+    }
 }
 
 /// A hit or a miss in 20 bytes.
@@ -47,7 +62,7 @@ struct PackedHit {
 
 /// The front of the triangle was met.
 const FRONT: u32 = 1 << 31;
-/// The ray has passed invisible surfaces: it knows no more what it met first.
+/// The ray has passed surfaces, or seen another at the place of what it met first: shaders had a say in it.
 const BEHIND_INVISIBLE: u32 = 1 << 30;
 /// There are other surfaces at the place.
 const CROWDED: u32 = 1 << 29;
@@ -80,7 +95,8 @@ pub(super) struct KnownNode<'a> {
 pub(super) struct RunRecord {
     wanted: bool,
     lights: usize,
-    nodes: Vec<Option<(WaveRay, Option<Hit>)>>,
+    /// The ray, what it met, and whether it would meet that again.
+    nodes: Vec<Option<(WaveRay, Option<Hit>, bool)>>,
     visibility: Vec<f32>,
 }
 
@@ -92,15 +108,15 @@ impl RunRecord {
         self.visibility.clear();
     }
 
-    /// Notes what the ray of a node met.
+    /// Notes what the ray of a node met. What it `met_first` it will meet again; else that depends on shaders.
     #[inline]
-    pub fn note(&mut self, ray: &WaveRay, hit: Option<&Hit>) {
+    pub fn note(&mut self, ray: &WaveRay, hit: Option<&Hit>, met_first: bool) {
         if self.wanted {
             let node = ray.node as usize;
             if self.nodes.len() <= node {
                 self.nodes.resize(node + 1, None);
             }
-            self.nodes[node] = Some((*ray, hit.copied()));
+            self.nodes[node] = Some((*ray, hit.copied(), met_first && ray.passed == 0));
             // What an invisible surface before it saw of the lights is another matter.
             let first = node * self.lights;
             if let Some(visibility) = self.visibility.get_mut(first..first + self.lights) {
@@ -149,13 +165,14 @@ impl TileRecord {
                     met: Vec::new(),
                     starts: Vec::new(),
                     visibility: Vec::new(),
+                    behind: Vec::new(),
                 };
                 self.paths.insert(place, of_path);
             }
             let of_path = &mut self.paths[place];
             for &index in nodes {
                 let node = &run.nodes[index as usize];
-                let Some((ray, hit)) = record.nodes.get(index as usize).copied().flatten() else { continue };
+                let Some((ray, hit, again)) = record.nodes.get(index as usize).copied().flatten() else { continue };
                 if path != NodePath::CAMERA {
                     let TreeNode { sample, cone, length_before, .. } = *node;
                     of_path.samples.push(sample);
@@ -169,8 +186,22 @@ impl TileRecord {
                     of_path.visibility.extend_from_slice(known);
                     of_path.visibility.resize((of_path.met.len() + 1) * self.lights, UNKNOWN);
                 }
-                of_path.met.push(PackedHit::new(hit.as_ref(), ray.passed > 0));
+                of_path.met.push(PackedHit::new(hit.as_ref(), !again));
             }
+        }
+        let sample_of = |(node, place, ..): &(u32, u32, Hit, Node)| (*place, run.nodes[*node as usize].sample);
+        let mut order: Vec<_> = run.surfaces.iter().collect();
+        order.sort_by_key(|surface| sample_of(surface));
+        for surface @ (node, _, hit, _) in order {
+            let path = run.nodes[*node as usize].path;
+            let Ok(of_path) = self.paths.binary_search_by_key(&path, |known| known.path) else { continue };
+            let (place, sample) = sample_of(surface);
+            let (behind, place) = (&mut self.paths[of_path].behind, place as usize - 1);
+            if behind.len() <= place {
+                behind.resize_with(place + 1, BehindRecord::default);
+            }
+            behind[place].samples.push(sample);
+            behind[place].met.push(PackedHit::new(Some(hit), false));
         }
     }
 
@@ -181,6 +212,10 @@ impl TileRecord {
             of_path.met.shrink_to_fit();
             of_path.starts.shrink_to_fit();
             of_path.visibility.shrink_to_fit();
+            for behind in &mut of_path.behind {
+                behind.samples.shrink_to_fit();
+                behind.met.shrink_to_fit();
+            }
         }
         self
     }
@@ -194,8 +229,10 @@ impl TileRecord {
 
     /// Forgets which of several surfaces at one place was met first.
     pub fn forget_ties(&mut self) {
-        for met in self.paths.iter_mut().flat_map(|of_path| &mut of_path.met) {
-            if met.triangle & CROWDED != 0 {
+        for of_path in &mut self.paths {
+            // Of lists, any place may have changed.
+            let all = !of_path.behind.is_empty();
+            for met in of_path.met.iter_mut().filter(|met| all || met.triangle & CROWDED != 0) {
                 met.triangle |= BEHIND_INVISIBLE;
             }
         }
@@ -209,6 +246,11 @@ impl TileRecord {
                 + size_of_val(&path.met[..])
                 + size_of_val(&path.starts[..])
                 + size_of_val(&path.visibility[..])
+                + path
+                    .behind
+                    .iter()
+                    .map(|behind| size_of_val(&behind.samples[..]) + size_of_val(&behind.met[..]))
+                    .sum::<usize>()
                 + size_of::<PathRecord>()
         };
         self.paths.iter().map(of_path).sum()
@@ -229,6 +271,20 @@ impl TileRecord {
             visibility: of_path.visibility.get(row * self.lights..(row + 1) * self.lights).unwrap_or_default(),
             passed_invisible: met.triangle & BEHIND_INVISIBLE != 0,
         })
+    }
+
+    /// The surfaces behind the first in the list of a node.
+    pub(super) fn behind(&self, path: NodePath, sample: u32) -> impl Iterator<Item = Hit> + '_ {
+        let of_path =
+            self.paths.binary_search_by_key(&path, |known| known.path).ok().map(|at| &self.paths[at].behind[..]);
+        of_path.unwrap_or_default().iter().map_while(move |behind| behind.hit(sample))
+    }
+
+    /// One of them, by its place, counted from 1.
+    #[inline]
+    pub(super) fn surface(&self, path: NodePath, place: usize, sample: u32) -> Option<Hit> {
+        let of_path = self.paths.binary_search_by_key(&path, |known| known.path).ok()?;
+        self.paths[of_path].behind.get(place.checked_sub(1)?)?.hit(sample)
     }
 
     /// What a ray to a node meets, if that is known: `Some(None)` is nothing.

@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use smallvec::SmallVec;
+
 use super::cone::Cone;
 use super::media::{Crossing, Pass};
 use super::ray_tree::{Run, TreeNode, WaveHit, WaveRay};
@@ -10,10 +12,10 @@ use crate::clock::CpuClock;
 use crate::math::{Vec2, Vec3, luminance};
 use crate::plan::MaterialPlan;
 use crate::sample::{Node, NodePath};
-use crate::scene::ids::MaterialId;
+use crate::scene::ids::{MaterialId, ObjectId};
 use crate::shade::analysis::inputs::LIMIT;
 use crate::shade::batch::{HitBatch, LightSample, OutputBatch};
-use crate::shade::bsdf::{Bounces, unit};
+use crate::shade::bsdf::{Bounces, BsdfLanes, LANES, LightLanes, unit};
 use crate::shade::{Bsdf, InputSet, Mode, OutputSet, PathKind};
 
 /// A branch of the ray tree that weighs less than this in every channel is not traced: what it shows would have to be
@@ -40,11 +42,59 @@ impl TileTracer<'_> {
         let plan = &self.plan.materials[material.index()];
         let lights = self.shade(group, run, true, context, work);
         let lights_per_hit = if plan.lights { self.lighting.len() } else { 0 };
-        for (index, hit) in group.iter().enumerate() {
-            let outputs = self.outputs_of(material, index, context);
-            let lights = &lights[index * lights_per_hit..(index + 1) * lights_per_hit];
-            self.finish(hit, plan, outputs, lights, run);
+        for (place, hits) in group.chunks(LANES).enumerate() {
+            let first = place * LANES;
+            let lights = &lights[first * lights_per_hit..(first + hits.len()) * lights_per_hit];
+            let lit = self.light_together(hits, first, plan, lights, context);
+            for (lane, hit) in hits.iter().enumerate() {
+                let outputs = self.outputs_of(material, first + lane, context);
+                let lights = &lights[lane * lights_per_hit..(lane + 1) * lights_per_hit];
+                let lit = lit.as_ref().map(|(bsdfs, lit)| (bsdfs[lane], lit.radiance(lane)));
+                self.finish(hit, plan, outputs, (lights, lit), run);
+            }
         }
+    }
+
+    /// How some of the hits that were shaded last (from the `first` on) scatter light, and what of it their viewers see; `None` if
+    /// that has to be told one by one: where bodies overlap, and where a script gives the colour.
+    fn light_together(
+        &self,
+        hits: &[WaveHit],
+        first: usize,
+        plan: &MaterialPlan,
+        lights: &[LightSample],
+        context: &TraceContext<'_>,
+    ) -> Option<(SmallVec<[Bsdf; LANES]>, BsdfLanes)> {
+        let material = hits.first()?.material;
+        if !self.plan.color || !self.plan.bodies.is_empty() {
+            return None;
+        }
+        let mut bsdfs = SmallVec::new();
+        let mut lanes = BsdfLanes::default();
+        for (lane, hit) in hits.iter().enumerate() {
+            let outputs = self.outputs_of(material, first + lane, context);
+            if value(&outputs.batch.color, outputs.row, None).is_some() {
+                return None;
+            }
+            let bsdf = self.bsdf(hit, outputs, 1.0);
+            let direction = hit.ray.direction;
+            let emission = value(&outputs.batch.emission, outputs.row, Vec3::ZERO);
+            lanes.set(lane, &bsdf, -direction, emission, || {
+                self.lighting.background(bsdf.mirror_direction(direction, hit.surface.geometric_normal))
+            });
+            bsdfs.push(bsdf);
+        }
+        let mut columns: SmallVec<[LightLanes; 2]> = SmallVec::new();
+        if plan.lit && !lights.is_empty() {
+            columns.resize_with(lights.len() / hits.len(), LightLanes::default);
+            for (lane, lights) in lights.chunks_exact(columns.len()).enumerate() {
+                for (column, light) in columns.iter_mut().zip(lights).filter(|(_, light)| light.visibility > 0.0) {
+                    column.set(lane, light.direction, light.radiance * light.visibility);
+                }
+            }
+        }
+        lanes.light(self.world.arch, &columns, self.lighting.ambient);
+        Some((bsdfs, lanes))
     }
 
     /// Runs the shader of hits of one material, of which there is at least one; returns what lights give them, if anybody asks.
@@ -215,7 +265,14 @@ impl TileTracer<'_> {
     }
 
     /// Lights one hit, fills its node, and sends on what it mirrors and lets pass.
-    fn finish(&self, hit: &WaveHit, plan: &MaterialPlan, outputs: Outputs<'_>, lights: &[LightSample], run: &mut Run) {
+    fn finish(
+        &self,
+        hit: &WaveHit,
+        plan: &MaterialPlan,
+        outputs: Outputs<'_>,
+        (lights, lit): (&[LightSample], Option<(Bsdf, Vec3)>),
+        run: &mut Run,
+    ) {
         let direction = hit.ray.direction;
         let Outputs { batch, row } = outputs;
         let opacity = self.opacity(outputs);
@@ -251,7 +308,7 @@ impl TileTracer<'_> {
         if let Some(color) = value(&batch.color, row, None) {
             node.radiance = color * opacity;
         } else if self.plan.color || plan.reflects || plan.refracts {
-            let mut bsdf = self.bsdf(hit, outputs, inside);
+            let mut bsdf = lit.map_or_else(|| self.bsdf(hit, outputs, inside), |(bsdf, _)| bsdf);
             if let Some(crossing) = &crossing {
                 bsdf.surrounding = match crossing.pass {
                     Pass::Thin => bsdf.ior,
@@ -259,17 +316,23 @@ impl TileTracer<'_> {
                     _ => inside,
                 };
             }
-            mirrored = bsdf.mirror_direction(direction, hit.surface.geometric_normal);
-            if self.plan.color {
+            let mirror_direction = || bsdf.mirror_direction(direction, hit.surface.geometric_normal);
+            let around = || {
+                bsdf.surroundings(-direction, self.lighting.ambient, || self.lighting.background(mirror_direction()))
+            };
+            if let Some((_, radiance)) = lit {
+                let radiance = if bsdf.is_mirror() { radiance + around() } else { radiance };
+                node.radiance = radiance * opacity;
+            } else if self.plan.color {
                 let mut radiance = value(&batch.emission, row, Vec3::ZERO);
                 let arriving = lights.iter().filter(|light| plan.lit && light.visibility > 0.0);
                 for light in arriving {
                     radiance += bsdf.scatter(-direction, light.direction, light.radiance * light.visibility);
                 }
-                radiance += bsdf.surroundings(-direction, self.lighting.ambient, || self.lighting.background(mirrored));
-                node.radiance = radiance * opacity;
+                node.radiance = (radiance + around()) * opacity;
             }
             if plan.reflects || plan.refracts {
+                mirrored = mirror_direction();
                 bounces = bsdf.bounces(direction, hit.surface.geometric_normal);
                 eta = bsdf.eta();
                 if let Some(Crossing { mut behind, enters, .. }) = crossing {
@@ -356,36 +419,43 @@ impl TileTracer<'_> {
         }
     }
 
-    pub(super) fn attributes(&self, hit: &WaveHit, cone: Cone, Outputs { batch, row }: Outputs<'_>) -> Node {
-        let object = &self.scene.objects()[hit.hit.object.index()];
+    pub(super) fn attributes(&self, hit: &WaveHit, cone: Cone, outputs: Outputs<'_>) -> Node {
         let placed = self.world.object(hit.hit.object);
-        let lines = self.scene.lines();
-        let width = value(&batch.line_width, row, None).unwrap_or(lines.width);
-        let priority = value(&batch.priority, row, None)
-            .or(object.priority)
-            .or(self.scene.materials()[hit.material.index()].priority)
-            .unwrap_or(0);
         let columns = self.plan.layout.columns;
         let uv = columns.uv.then(|| hit.surface.uv(placed, &hit.hit, 0));
         let stand_in = self.stand_ins.get(hit.hit.object.index()).copied().unwrap_or(hit.hit.object);
         let footprint = if columns.overlap { cone.after(hit.hit.t).footprint() } else { 0.0 };
         Node {
             object: stand_in.0 + 1,
-            member: hit.hit.object.0 + 1,
-            shader: hit.material.0 + 1,
             uv: uv.unwrap_or_default().to_array(),
             normal: hit.surface.normal.to_array(),
-            feature: value(&batch.feature, row, Vec3::ZERO).to_array(),
             depth: hit.depth,
+            position: hit.surface.position.to_array(),
+            geometric_normal: hit.surface.geometric_normal.to_array(),
+            footprint,
+            ..self.style(hit.hit.object, hit.material, outputs)
+        }
+    }
+
+    /// The part of a node's attributes that depends on its object and its shader's outputs alone; the rest is neutral.
+    pub(super) fn style(&self, id: ObjectId, material: MaterialId, Outputs { batch, row }: Outputs<'_>) -> Node {
+        let object = &self.scene.objects()[id.index()];
+        let lines = self.scene.lines();
+        let width = value(&batch.line_width, row, None).unwrap_or(lines.width);
+        let priority = value(&batch.priority, row, None)
+            .or(object.priority)
+            .or(self.scene.materials()[material.index()].priority)
+            .unwrap_or(0);
+        Node {
+            object: id.0 + 1,
+            member: id.0 + 1,
+            shader: material.0 + 1,
+            feature: value(&batch.feature, row, Vec3::ZERO).to_array(),
             line_color: value(&batch.line_color, row, None).unwrap_or(lines.color).to_array(),
             line_width: if object.lines { width } else { 0.0 },
             line_opacity: value(&batch.line_opacity, row, 1.0),
             priority,
-            position: hit.surface.position.to_array(),
-            geometric_normal: hit.surface.geometric_normal.to_array(),
-            footprint,
-            throughput: [1.0; 3],
-            contribution: [0.0; 3],
+            ..Node::default()
         }
     }
 

@@ -41,7 +41,8 @@ impl TileTracer<'_> {
                 let place = index * lights + light;
                 let (mut sample, distance) = self.lighting.sample(light, surface.position);
                 let known = match work.known {
-                    Some(known) if hit.place == 0 => {
+                    // Shadow rays start farther off where bodies touch, which depends on shaders.
+                    Some(known) if hit.place == 0 && self.plan.bodies.is_empty() => {
                         known.visibility(&nodes[hit.ray.node as usize], &hit.ray, &hit.hit).get(light).copied()
                     }
                     _ => None,

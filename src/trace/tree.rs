@@ -84,7 +84,7 @@ impl Leaf<'_> {
     #[inline(always)]
     #[must_use]
     pub(super) fn planes(&self) -> [f32; 6] {
-        self.node.planes.map(|plane| plane.to_array()[self.child])
+        self.node.planes.each_ref().map(|plane| plane.as_ref()[self.child])
     }
 }
 

@@ -31,7 +31,7 @@ use crate::shade::batch::{HitBatch, OutputBatch};
 use crate::shade::{Lighting, LineStyles, OutputSet, PathKind, ShadeErrors, Shaders, Shading};
 
 /// Samples of a run of pixels that are traced together.
-const RUN_SAMPLES: usize = 4096;
+const RUN_SAMPLES: usize = 2048;
 /// The same where rays branch, so that even deep trees of mirrors and glass stay small in memory.
 const RUN_SAMPLES_BRANCHING: usize = 1024;
 /// Most surfaces of opacity 0 that a ray passes before it is taken to leave the scene.
@@ -67,7 +67,7 @@ impl std::ops::AddAssign for RayCounts {
 pub struct TracedTile {
     /// The samples.
     pub samples: SampleBuffer,
-    /// What the rays met, if it was to be kept.
+    /// What the rays met, if it was to be kept and was not all known.
     pub record: Option<TileRecord>,
     /// Rays traced.
     pub rays: RayCounts,
@@ -150,7 +150,7 @@ impl<'a> TileTracer<'a> {
             plan,
             world,
             lighting,
-            positions: SamplePositions::new(settings.samples, settings.seed),
+            positions: SamplePositions::new(settings.sampler, settings.samples, settings.seed),
             rays: scene.camera().rays(settings.size),
             transparent: settings.background == Background::Transparent,
             stand_ins: scene.stand_ins(),
@@ -167,6 +167,19 @@ impl<'a> TileTracer<'a> {
 
     /// The same with a memory: what is known of the rays is not traced again.
     pub fn trace_with(&self, rect: PixelRect, context: &mut TraceContext<'_>, memory: Memory<'_>) -> TracedTile {
+        if memory.known.is_some() && memory.keep {
+            // A record that answers every ray need not be made again.
+            let errors = context.errors.clone();
+            let traced = self.trace_tile(rect, context, Memory { keep: false, only_known: true, ..memory });
+            if traced.rays == RayCounts::default() {
+                return traced;
+            }
+            context.errors = errors;
+        }
+        self.trace_tile(rect, context, memory)
+    }
+
+    fn trace_tile(&self, rect: PixelRect, context: &mut TraceContext<'_>, memory: Memory<'_>) -> TracedTile {
         let clock = CpuClock::thread();
         let mut work = Work { known: memory.known, ..Work::new(self.scene.materials().len()) };
         let mut record = memory.keep.then(|| TileRecord::new(self.lighting.len()));
@@ -178,6 +191,9 @@ impl<'a> TileTracer<'a> {
         while first < rect.pixels() {
             let run = first..(first + run_pixels).min(rect.pixels());
             self.trace_run(rect, run.clone(), (&mut samples, &mut record), context, &mut work);
+            if memory.only_known && work.rays != RayCounts::default() {
+                break;
+            }
             first = run.end;
         }
         let samples = samples.finish();
@@ -213,7 +229,7 @@ impl<'a> TileTracer<'a> {
             self.run_wave(wave, &mut run, context, work);
         }
         run.gather_radiance();
-        run.surfaces.sort_by_key(|&(node, place, _)| (place, node));
+        run.surfaces.sort_by_key(|&(node, place, ..)| (place, node));
         self.store(&run, samples);
         if let Some(record) = record {
             record.add(&run);
@@ -242,7 +258,8 @@ impl<'a> TileTracer<'a> {
         let width = rect.width() as usize;
         pixels.flat_map(move |index| {
             let pixel = [rect.x0 + (index % width) as i32, rect.y0 + (index / width) as i32];
-            let place = move |sample| (index as u32 * per_pixel + sample, pixel, self.positions.offset(pixel, sample));
+            let positions = self.positions.of_pixel(pixel);
+            let place = move |sample| (index as u32 * per_pixel + sample, pixel, positions.offset(sample));
             (0..per_pixel).map(place)
         })
     }
@@ -306,7 +323,7 @@ impl<'a> TileTracer<'a> {
                 let node = run.nodes.len() as u32;
                 let (origin, direction) = rays.ray_start(lane);
                 let ray = WaveRay { origin, direction, node, after: None, passed: 0, media: 0, counted: 0 };
-                run.record.note(&ray, met[lane].as_ref());
+                run.record.note(&ray, met[lane].as_ref(), true);
                 let mut root = TreeNode::root(samples[lane], self.cone);
                 match met[lane] {
                     Some(hit) => hits.push(self.wave_hit(&ray, &hit, &root, 0)),
@@ -342,11 +359,16 @@ impl<'a> TileTracer<'a> {
             let node = &mut nodes[wave_ray.node as usize];
             let ray = Ray::new(wave_ray.origin, wave_ray.direction);
             let mut from = *wave_ray;
-            let known = self.known_hit(work, node, wave_ray);
+            let known = self.known_hit(work, node, wave_ray, &mut list);
+            let mut is_known = known.is_some();
             let mut at_once = known.or(packet[index % LANES]);
+            // Whether what is seen is what was met first, so that a record of it serves the same ray again.
+            let mut met_first = true;
             let seen = loop {
-                let kind = if known.is_some() { RayKinds::empty() } else { work.count(node.kind) };
-                list.clear();
+                let kind = if is_known { seen_as(node.kind) } else { work.count(node.kind) };
+                if !std::mem::take(&mut is_known) {
+                    list.clear();
+                }
                 let found = if let Some(found) = at_once.take() {
                     found
                 } else if from.passed >= MOST_INVISIBLE {
@@ -362,10 +384,11 @@ impl<'a> TileTracer<'a> {
                     break Some(Seen { hit: found, error: Vec3::ZERO, crossing: None });
                 }
                 if let Some(seen) = self.cross(&ray, kind, &mut from, &found, media) {
+                    met_first = seen.hit == found;
                     break Some(seen);
                 }
             };
-            record.note(&from, seen.as_ref().map(|seen| &seen.hit));
+            record.note(&from, seen.as_ref().map(|seen| &seen.hit), met_first);
             let Some(Seen { hit, error, crossing }) = seen else {
                 self.miss(node, from.direction);
                 continue;
@@ -385,10 +408,21 @@ impl<'a> TileTracer<'a> {
         hits
     }
 
-    /// What a ray meets, if a record tells. Lists want more than that, and what is seen of bodies depends on their shaders.
-    fn known_hit(&self, work: &Work<'_>, node: &TreeNode, ray: &WaveRay) -> Option<Option<Hit>> {
-        let known = work.known.filter(|_| self.plan.bodies.is_empty() && !self.keeps_list(node.path))?;
-        known.met(node, ray)
+    /// What a ray meets, if a record tells, with its list of surfaces. Which surfaces a list holds is known only where
+    /// none can be invisible.
+    fn known_hit(&self, work: &Work<'_>, node: &TreeNode, ray: &WaveRay, list: &mut Vec<Hit>) -> Option<Option<Hit>> {
+        let known = work.known?;
+        list.clear();
+        if !self.keeps_list(node.path) {
+            return known.met(node, ray);
+        }
+        if !self.plan.lists_are_opaque() {
+            return None;
+        }
+        let first = known.met(node, ray)?;
+        list.extend(first);
+        list.extend(known.behind(node.path, node.sample));
+        Some(first)
     }
 
     /// What camera rays meet that start together; `None` for rays that are to be traced one by one: those of mirrors and glass
@@ -447,7 +481,7 @@ impl<'a> TileTracer<'a> {
         for node in others {
             samples.push(node.path, node.sample, self.attributes_of(run, node));
         }
-        for &(node, place, attributes) in &run.surfaces {
+        for &(node, place, _, attributes) in &run.surfaces {
             let node = &run.nodes[node as usize];
             samples.push_behind(node.path, place as usize, node.sample, attributes);
         }
@@ -467,8 +501,18 @@ impl<'a> TileTracer<'a> {
 pub struct Memory<'a> {
     /// The record of an earlier picture of the same objects, camera and sample positions.
     pub known: Option<&'a TileRecord>,
-    /// Whether to keep a record.
+    /// Whether to keep a record. If all was known, there is none: the known one serves on.
     pub keep: bool,
+    /// Whether to give up where a ray must be traced.
+    only_known: bool,
+}
+
+impl<'a> Memory<'a> {
+    /// A memory of what is known, if anything is.
+    #[must_use]
+    pub fn new(known: Option<&'a TileRecord>, keep: bool) -> Self {
+        Self { known, keep, only_known: false }
+    }
 }
 
 /// Counters of one tile, and what is known of its rays.
@@ -486,13 +530,22 @@ impl Work<'_> {
 
     /// Counts a ray towards a node; returns what objects see it as.
     pub fn count(&mut self, kind: PathKind) -> RayKinds {
-        let (count, kind) = match kind {
-            PathKind::Camera | PathKind::Shadow => (&mut self.rays.camera, RayKinds::CAMERA),
-            PathKind::Reflection => (&mut self.rays.reflection, RayKinds::REFLECTION),
-            PathKind::Refraction => (&mut self.rays.refraction, RayKinds::REFRACTION),
+        let count = match kind {
+            PathKind::Camera | PathKind::Shadow => &mut self.rays.camera,
+            PathKind::Reflection => &mut self.rays.reflection,
+            PathKind::Refraction => &mut self.rays.refraction,
         };
         *count += 1;
-        kind
+        seen_as(kind)
+    }
+}
+
+/// What objects see a ray towards a node as.
+fn seen_as(kind: PathKind) -> RayKinds {
+    match kind {
+        PathKind::Camera | PathKind::Shadow => RayKinds::CAMERA,
+        PathKind::Reflection => RayKinds::REFLECTION,
+        PathKind::Refraction => RayKinds::REFRACTION,
     }
 }
 

@@ -14,6 +14,9 @@ use crate::scene::settings::RayKinds;
 
 /// Fewer rays are traced one by one.
 const FEWEST: usize = 4;
+/// Shadow rays that leave another triangle than the ray before them, at most: where triangles are as small as rays are far apart,
+/// each ray of a packet enters leaves of its own, for which all have to be asked, and that was measured five times as slow.
+const MOST_CHANGES: usize = 6;
 
 impl World {
     /// The closest hits of at most [`LANES`] rays of one kind, as [`Self::closest`] finds them one by one. Quickest where the
@@ -37,12 +40,14 @@ impl World {
         (rays, self.closest_of_lanes(&rays, count, RayKinds::CAMERA))
     }
 
-    /// What is in the way of at most [`LANES`] shadow rays, as [`Self::blocked`] finds it one by one.
+    /// What is in the way of at most [`LANES`] shadow rays, as [`Self::blocked`] finds it one by one. Those that have little in
+    /// common are not looked at.
     #[must_use]
     pub fn blocked_of(&self, rays: &[ShadowRay], opaque: &impl Fn(MaterialId) -> bool) -> [Way; LANES] {
         let mut ways = [Way::Unknown; LANES];
         let starts: SmallVec<[RayStart; LANES]> = rays.iter().map(|ray| ray.start).collect();
-        if rays.len() < FEWEST {
+        if rays.len() < FEWEST || rays.windows(2).filter(|pair| pair[0].leaves != pair[1].leaves).count() > MOST_CHANGES
+        {
             return ways;
         }
         let Some(packet) = LaneRays::of(&starts) else { return ways };
@@ -203,12 +208,6 @@ impl<S: Search> Visitor for Objects<'_, S> {
     }
 }
 
-/// The largest component of any ray's origin.
-#[inline(always)]
-fn largest_start(rays: &LaneRays) -> f32 {
-    rays.origin.iter().flatten().fold(0.0, |largest, lane| if lane.abs() > largest { lane.abs() } else { largest })
-}
-
 struct Closest<'a> {
     world: &'a World,
     rays: &'a LaneRays,
@@ -233,7 +232,7 @@ impl Search for Nearest<'_> {
 
     #[inline(always)]
     fn object(&mut self, id: u32, object: &PlacedObject, placed: &LaneRays, near: &Lanes, reach: Lanes) {
-        let size = largest_start(placed).max(object.grain(Vec3::splat(self.farthest)).max_element());
+        let size = placed.largest_start().max(object.grain(Vec3::splat(self.farthest)).max_element());
         let (rays, culls, found) = (self.rays, self.culls, &mut self.found);
         let mut search = InObject { found, id, object, rays, size, culls, near, reach };
         match placed.shear() {
@@ -293,7 +292,7 @@ impl pulp::WithSimd for Closest<'_> {
     fn with_simd<S: pulp::Simd>(self, _: S) -> Self::Output {
         let Self { world, rays, kind, found } = self;
         let culls = kind != RayKinds::SHADOW;
-        let mut search = Nearest { rays, culls, farthest: largest_start(rays), found };
+        let mut search = Nearest { rays, culls, farthest: rays.largest_start(), found };
         each_object(world, rays, kind, &mut search)?;
         Some(search.found)
     }
@@ -349,7 +348,7 @@ impl<O: Fn(MaterialId) -> bool> Search for Ways<'_, O> {
 
     #[inline(always)]
     fn object(&mut self, id: u32, object: &PlacedObject, placed: &LaneRays, _: &Lanes, reach: Lanes) {
-        let size = largest_start(placed).max(object.grain(Vec3::splat(self.farthest)).max_element());
+        let size = placed.largest_start().max(object.grain(Vec3::splat(self.farthest)).max_element());
         let mut search = AnyInObject { id, object, size, reach, found: self };
         match placed.shear() {
             Some(shear) => intersect(&object.tree, placed, &shear, &mut search),
@@ -410,7 +409,7 @@ impl<O: Fn(MaterialId) -> bool> pulp::WithSimd for Blocked<'_, O> {
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) -> Self::Output {
         let Self { world, rays, shadow, opaque, reach } = self;
-        let farthest = largest_start(rays);
+        let farthest = rays.largest_start();
         let mut search = Ways { rays, shadow, opaque, farthest, reach, ways: [Way::Clear; LANES] };
         each_object(world, rays, RayKinds::SHADOW, &mut search)?;
         Some(search.ways)

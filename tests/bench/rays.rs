@@ -23,6 +23,7 @@ use tusche::trace::World;
 use tusche::trace::packet::{LANES, RayStart};
 use tusche::trace::surface::Surface;
 use tusche::trace::triangle::Ray;
+use tusche::trace::world::Facet;
 use tusche::trace::world_packet::{ShadowRay, Way};
 
 const SIZE: [u32; 2] = [1280, 720];
@@ -70,7 +71,7 @@ fn load(path: &Path, files: &FileStore) -> Scene {
 }
 
 /// Traces rays; how many of them meet something.
-type Trace = fn(&World, &[RayStart]) -> usize;
+type Trace = fn(&World, &[ShadowRay]) -> usize;
 
 fn measure(name: &str, scene: &Scene) {
     let transmissive = vec![false; scene.materials().len()];
@@ -79,33 +80,32 @@ fn measure(name: &str, scene: &Scene) {
     let (wall, cpu) = (wall.elapsed().as_secs_f64(), cpu.seconds());
 
     let camera = camera_rays(scene);
-    let surfaces: Vec<Surface> = camera
+    let surfaces: Vec<(Facet, Surface)> = camera
         .iter()
-        .filter_map(|&(origin, direction)| {
-            let ray = Ray::new(origin, direction);
-            let hit = world.closest(&ray, RayKinds::CAMERA, f32::INFINITY)?;
-            Some(Surface::new(&world, ray.direction, &hit))
+        .filter_map(|ray| {
+            let hit = world.closest(&single(ray), RayKinds::CAMERA, f32::INFINITY)?;
+            Some((hit.facet(), Surface::new(&world, ray.start.1, &hit)))
         })
         .collect();
     // Over the camera's left shoulder.
     let towards = scene.camera().world_from_camera.as_mat3() * Vec3::new(-0.4, 0.7, 0.6).normalize();
-    let shadow: Vec<RayStart> = surfaces
+    let shadow: Vec<ShadowRay> = surfaces
         .iter()
-        .filter(|surface| towards.dot(surface.geometric_normal) > 0.0)
-        .map(|surface| (surface.leave(towards), towards))
+        .filter(|(_, surface)| towards.dot(surface.geometric_normal) > 0.0)
+        .map(|(facet, surface)| endless((surface.leave(towards), towards), *facet))
         .collect();
     let mut state = 1;
-    let bounce: Vec<RayStart> = surfaces
+    let bounce: Vec<ShadowRay> = surfaces
         .iter()
-        .map(|surface| {
+        .map(|(facet, surface)| {
             let direction = around(surface.geometric_normal, &mut state);
-            (surface.leave(direction), direction)
+            endless((surface.leave(direction), direction), *facet)
         })
         .collect();
 
     for threads in [1, std::thread::available_parallelism().map_or(1, usize::from)] {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads can be started");
-        let line = |kind: &str, rays: &[RayStart], single: Trace, packets: Option<Trace>| {
+        let line = |kind: &str, rays: &[ShadowRay], single: Trace, packets: Option<Trace>| {
             let mut rates = [const { Vec::new() }; 3];
             for _ in 0..PASSES {
                 let single = rate(&pool, rays, &|rays| single(&world, rays));
@@ -133,13 +133,15 @@ fn measure(name: &str, scene: &Scene) {
     );
 }
 
-fn camera_rays(scene: &Scene) -> Vec<RayStart> {
+fn camera_rays(scene: &Scene) -> Vec<ShadowRay> {
     let mut rays = Vec::with_capacity((SIZE[0] * SIZE[1]) as usize);
     for top in (0..SIZE[1]).step_by(BLOCK as usize) {
         for left in (0..SIZE[0]).step_by(BLOCK as usize) {
             for y in top..(top + BLOCK).min(SIZE[1]) {
                 for x in left..(left + BLOCK).min(SIZE[0]) {
-                    rays.push(scene.camera().ray(SIZE, [x as i32, y as i32], [0.5, 0.5]));
+                    let start = scene.camera().ray(SIZE, [x as i32, y as i32], [0.5, 0.5]);
+                    // They leave no triangle: none has this number.
+                    rays.push(endless(start, (ObjectId(0), u32::MAX)));
                 }
             }
         }
@@ -166,39 +168,54 @@ fn random(state: &mut u64) -> f32 {
     ((*state >> 40) as f32 / (1u64 << 23) as f32) - 1.0
 }
 
-fn closest(world: &World, rays: &[RayStart]) -> usize {
-    let meets = |&(origin, direction): &RayStart| {
-        world.closest(&Ray::new(origin, direction), RayKinds::CAMERA, f32::INFINITY).is_some_and(|hit| hit.t > 0.0)
-    };
-    rays.iter().filter(|ray| meets(ray)).count()
+/// A ray that goes on for ever.
+fn endless(start: RayStart, leaves: Facet) -> ShadowRay {
+    ShadowRay { start, reach: f32::INFINITY, leaves }
 }
 
-fn closest_of(world: &World, rays: &[RayStart]) -> usize {
-    let meet = |rays| world.closest_of(rays, RayKinds::CAMERA).iter().flatten().filter(|hit| hit.t > 0.0).count();
+fn single(ray: &ShadowRay) -> Ray {
+    Ray::new(ray.start.0, ray.start.1)
+}
+
+fn closest(world: &World, rays: &[ShadowRay]) -> usize {
+    let closest = |ray: &ShadowRay| world.closest(&single(ray), RayKinds::CAMERA, f32::INFINITY);
+    rays.iter().filter(|ray| closest(ray).is_some_and(|hit| hit.t > 0.0)).count()
+}
+
+fn closest_of(world: &World, rays: &[ShadowRay]) -> usize {
+    let meet = |rays: &[ShadowRay]| {
+        let mut starts = [(Vec3::ZERO, Vec3::ZERO); LANES];
+        starts.iter_mut().zip(rays).for_each(|(start, ray)| *start = ray.start);
+        let hits = world.closest_of(&starts[..rays.len()], RayKinds::CAMERA);
+        hits.iter().flatten().filter(|hit| hit.t > 0.0).count()
+    };
     rays.chunks(LANES).map(meet).sum()
 }
 
-fn blocked(world: &World, rays: &[RayStart]) -> usize {
-    let mut passed = Vec::new();
-    let mut is_blocked = |&(origin, direction): &RayStart| {
-        world.blocked(&Ray::new(origin, direction), f32::INFINITY, None, |_| true, &mut passed)
-    };
-    rays.iter().filter(|ray| is_blocked(ray)).count()
+fn is_blocked(world: &World, ray: &ShadowRay) -> bool {
+    world.blocked(&single(ray), ray.reach, Some(ray.leaves), |_| true, &mut Vec::new())
 }
 
-fn blocked_of(world: &World, rays: &[RayStart]) -> usize {
-    let count = |rays: &[RayStart]| {
-        // No triangle has this number.
-        let leaves = (ObjectId(0), u32::MAX);
-        let rays: Vec<ShadowRay> =
-            rays.iter().map(|&start| ShadowRay { start, reach: f32::INFINITY, leaves }).collect();
-        world.blocked_of(&rays, &|_| true).iter().filter(|way| **way == Way::Blocked).count()
+fn blocked(world: &World, rays: &[ShadowRay]) -> usize {
+    rays.iter().filter(|ray| is_blocked(world, ray)).count()
+}
+
+/// As the renderer does it: what packets leave open is looked at one by one.
+fn blocked_of(world: &World, rays: &[ShadowRay]) -> usize {
+    let count = |rays: &[ShadowRay]| {
+        let ways = world.blocked_of(rays, &|_| true);
+        let blocked = |(way, ray): &(Way, &ShadowRay)| match way {
+            Way::Clear => false,
+            Way::Blocked => true,
+            Way::Unknown => is_blocked(world, ray),
+        };
+        ways.into_iter().zip(rays).filter(blocked).count()
     };
     rays.chunks(LANES).map(count).sum()
 }
 
 /// Millions of rays a second in one pass.
-fn rate(pool: &rayon::ThreadPool, rays: &[RayStart], trace: &(dyn Fn(&[RayStart]) -> usize + Sync)) -> f64 {
+fn rate(pool: &rayon::ThreadPool, rays: &[ShadowRay], trace: &(dyn Fn(&[ShadowRay]) -> usize + Sync)) -> f64 {
     let threads = pool.current_num_threads() as f64;
     let clock = CpuClock::process();
     let mut traced = 0;

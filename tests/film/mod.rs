@@ -58,6 +58,7 @@ impl Samples {
                 ];
                 // Some regions have no lines at all.
                 (hash(x / 8, y / 8, 0, 6).is_multiple_of(2) && hash(x, y, s, 7).is_multiple_of(3)).then(|| SeenLine {
+                    covers: false,
                     alpha: 0.5 + 0.5 * unit(x, y, s, 8),
                     lined: [unit(x, y, s, 9), 0.0, 0.2],
                     ..line([0.3, unit(x, y, s, 10), 0.0], tests[hash(x, y, s, 11) as usize % tests.len()])
@@ -146,7 +147,7 @@ fn rects(rect: PixelRect, side: i32) -> Vec<PixelRect> {
 
 fn line(color: [f32; 3], fired: Fired) -> SeenLine {
     let (path, neighbor) = (NodePath::CAMERA, ([0, 0], 0));
-    SeenLine { color, alpha: 1.0, lined: color, path, fired, neighbor, own: true, hidden: false }
+    SeenLine { color, alpha: 1.0, lined: color, covers: true, path, fired, neighbor, own: true, hidden: false }
 }
 
 fn hash(x: i32, y: i32, s: u32, salt: u32) -> u32 {

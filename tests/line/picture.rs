@@ -3,7 +3,7 @@
 use tusche::line::{LineBuffer, LineScripts, LineTile, Method, Rules, TileBounds, Window, find_lines};
 use tusche::sample::position::SamplePositions;
 use tusche::sample::{HandMadeSample, Node, NodeColumnSet, NodePath, PairBatch, PixelRect, SampleBuffer, SampleLayout};
-use tusche::scene::settings::LineSettings;
+use tusche::scene::settings::{LineSettings, Sampler};
 
 /// Everything a buffer can keep.
 pub fn layout(samples_per_pixel: u32, max_width: f32) -> SampleLayout {
@@ -12,12 +12,12 @@ pub fn layout(samples_per_pixel: u32, max_width: f32) -> SampleLayout {
 
 /// The samples of a rectangle of a picture; `node` gives what the camera sees at a point of the film, in pixels.
 pub fn sampled(rect: PixelRect, layout: &SampleLayout, node: &dyn Fn([f32; 2]) -> Node) -> SampleBuffer {
-    let positions = SamplePositions::new(layout.samples_per_pixel, 7);
+    let positions = SamplePositions::new(Sampler::Stratified, layout.samples_per_pixel, 7);
     let mut nodes = Vec::new();
     for y in rect.y0..rect.y1 {
         for x in rect.x0..rect.x1 {
             for sample in 0..layout.samples_per_pixel {
-                let offset = positions.offset([x, y], sample);
+                let offset = positions.of_pixel([x, y]).offset(sample);
                 nodes.push((offset, [(NodePath::CAMERA, node([x as f32 + offset[0], y as f32 + offset[1]]))]));
             }
         }

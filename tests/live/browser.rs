@@ -184,6 +184,36 @@ fn the_page_in_a_browser() {
     browser.run("why(16, 3)");
     browser.wait("return document.getElementById('explanation').textContent.startsWith('pixel 16, 3')");
 
+    // What the picture cost, and what of it was known before.
+    let cost = browser.run("return document.querySelector('footer').textContent");
+    let cost = cost.as_str().unwrap_or("");
+    for part in ["2 samples", "trace", "shade", "lines", "film", "done again: rays", "rays, "] {
+        assert!(cost.contains(part), "`{part}` is not in `{cost}`");
+    }
+    assert_eq!(browser.run("return document.getElementById('memory').hidden"), json!(true));
+
+    // By keyboard: the next layer and back, exposure, a setting, help.
+    let press = |key: &str| {
+        let event = format!("new KeyboardEvent('keydown', {{ key: '{key}', bubbles: true, cancelable: true }})");
+        browser.run(&format!("(document.activeElement ?? document.body).dispatchEvent({event})"));
+    };
+    press("l");
+    browser.wait("return picture.layer === 'color'");
+    press("L");
+    browser.wait("return picture.layer === 'rgba'");
+    press("]");
+    assert_eq!(browser.run("return document.getElementById('stops').textContent"), json!("+0.25"));
+    press("\\\\");
+    assert_eq!(browser.run("return document.getElementById('stops').textContent"), json!("0"));
+    press("/");
+    assert_eq!(browser.run("return document.activeElement.id"), json!("filter"));
+    press("Escape");
+    press("?");
+    assert_eq!(browser.run("return document.getElementById('keys').open"), json!(true));
+    browser.run("document.getElementById('keys').close()");
+    press("Escape");
+    assert_eq!(browser.run("return document.getElementById('why').hidden"), json!(true));
+
     // The edit goes into the file, and none is left.
     browser.run("document.getElementById('save').click()");
     browser.wait("return document.getElementById('count').textContent === 'no edits'");

@@ -111,33 +111,55 @@ fn it_writes_pictures_until_it_is_interrupted() {
     assert!(strange.is_empty(), "{strange:?}");
 }
 
+#[cfg(unix)]
+#[test]
+fn a_memory_limit_that_is_too_small_is_told() {
+    let place = place();
+    let running = Running::start(&place, &["watch", "scene.toml", "--cache", "1K", "--no-page"]);
+    running.says("only the picture is kept, and every edit renders all of it again");
+    running.says("--cache");
+    running.ends_cleanly();
+}
+
+/// `TUSCHE_RELOADS=1000` makes that many reloads.
+#[cfg(target_os = "linux")]
+fn reloads() -> usize {
+    std::env::var("TUSCHE_RELOADS").ok().and_then(|text| text.parse().ok()).unwrap_or(180)
+}
+
 #[cfg(target_os = "linux")]
 #[test]
 fn reloads_leave_nothing_behind() {
     let place = place();
     let running = Running::start(&place, &["watch", "scene.toml"]);
     running.says("picture of");
-    let count = |what: &str| {
-        let folder = format!("/proc/{}/{what}", running.child.id());
-        fs::read_dir(folder).expect("the system tells").count()
+    let process = format!("/proc/{}", running.child.id());
+    let count = |what: &str| fs::read_dir(format!("{process}/{what}")).expect("the system tells").count();
+    let kibibytes = || {
+        let status = fs::read_to_string(format!("{process}/status")).expect("the system tells");
+        let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:")).expect("memory is told");
+        line.trim_end_matches("kB").trim().parse::<usize>().expect("it is a number")
     };
     let scene = place.folder.path().join("scene.toml");
-    let mut counts = Vec::new();
-    for round in 0..60_u16 {
-        replace(&scene, with_background(0.3 + 0.01 * f32::from(round)));
+    let mut found = Vec::new();
+    // Each makes three: another scene, a broken script, and the script as it was.
+    let rounds = reloads() / 3;
+    for round in 0..rounds {
+        replace(&scene, with_background(0.3 + 0.01 * (round % 60) as f32));
         running.says("picture of");
         place.file("ink.rhai", "fn surface(");
         running.says("ink.rhai:1:");
         place.file("ink.rhai", INK);
         running.says("mended");
         running.says("picture of");
-        if round % 20 == 9 {
-            counts.push((count("task"), count("fd")));
+        if round % (rounds / 3).max(1) == rounds / 6 {
+            found.push((count("task"), count("fd"), kibibytes()));
         }
     }
     // Threads of a pool may still be on their way out.
-    let [first, .., last] = counts[..] else { panic!("{counts:?}") };
-    assert!(last.0 <= first.0 + 2 && last.1 <= first.1, "threads and open files grew: {counts:?}");
+    let [first, .., last] = found[..] else { panic!("{found:?}") };
+    assert!(last.0 <= first.0 + 2 && last.1 <= first.1, "threads and open files grew: {found:?}");
+    assert!(last.2 <= first.2 + first.2 / 10, "memory grew: {found:?}");
 }
 
 #[test]

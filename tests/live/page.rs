@@ -1,7 +1,7 @@
 //! The page's server: what it serves, and whom it refuses.
 
 use serde_json::json;
-use tusche::live::PageOptions;
+use tusche::live::{Kept, News, PageOptions};
 
 use super::http::{Answer, Events, get, parts, post, request, send};
 use super::{INK, SCENE, Watching, inked, options, place};
@@ -170,6 +170,28 @@ fn faults_are_shown_with_their_snippet_and_go() {
     assert_eq!(get(&format!("{}picture", watching.url())).status, 200, "the last good picture stays");
     place.file("ink.rhai", INK);
     events.wait("faults", |faults| faults["list"] == json!([]));
+}
+
+#[test]
+fn a_memory_limit_that_is_too_small_is_told() {
+    let place = place();
+    let mut options = options(&place);
+    options.page = Some(PageOptions::LOCAL);
+    options.session.cache_bytes = 0;
+    let watching = Watching::start(options);
+    let cache = watching.wait("word of the memory limit", |news| match news {
+        News::Memory(cache) => Some(*cache),
+        _ => None,
+    });
+    assert_eq!((cache.kept, cache.limit), (Kept::Nothing, 0));
+    let mut events = Events::open(&format!("{}events", watching.url()));
+    let picture = events.wait("picture", |picture| picture["final"] == true);
+    assert!(picture["memory"].as_str().is_some_and(|text| text.contains("only the picture is kept")), "{picture}");
+    // Where there is room, nothing is said.
+    drop(watching);
+    let watching = self::watching(&place);
+    let mut events = Events::open(&format!("{}events", watching.url()));
+    assert_eq!(events.wait("picture", |picture| picture["final"] == true)["memory"], json!(null));
 }
 
 #[test]

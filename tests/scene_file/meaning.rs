@@ -11,7 +11,8 @@ use tusche::scene::ids::ObjectId;
 use tusche::scene::light::LightKind;
 use tusche::scene::material::ParamValue;
 use tusche::scene::settings::{
-    Background, Composition, FilterKind, HiddenLines, LineSettings, LineType, RayKinds, RenderSettings, TypeStyle,
+    Background, Composition, FilterKind, HiddenLines, LineSettings, LineType, RayKinds, RenderSettings, Sampler,
+    TypeStyle,
 };
 use tusche::scene::shape::Shape;
 use tusche::scene::texture::{Pixels, TextureFilter, Wrap};
@@ -39,6 +40,7 @@ fn every_setting_is_taken_over() {
         RenderSettings {
             size: [320, 240],
             samples: 9,
+            sampler: Sampler::BlueNoise,
             seed: 7,
             background: Background::Gradient { bottom: Vec3::splat(0.1), top: Vec3::new(0.5, 0.6, 0.7) },
             ambient: Vec3::new(0.3, 0.2, 0.1),

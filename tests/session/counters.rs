@@ -3,7 +3,7 @@
 use std::sync::{Arc, OnceLock};
 
 use tusche::film::Layer;
-use tusche::live::{Event, LivePicture, Session, SessionOptions, Setup};
+use tusche::live::{Event, Kept, LivePicture, Session, SessionOptions, Setup};
 use tusche::render::RenderOptions;
 use tusche::scene::settings::Background;
 use tusche::scene::texture::{Image, Pixels, Texture, TextureFilter, Wrap};
@@ -68,6 +68,13 @@ impl Desk {
         self.session.render().unwrap_or_else(|faults| panic!("{faults}"))
     }
 
+    /// Compares a picture with a fresh one, to the bit.
+    #[track_caller]
+    fn is_fresh(&self, live: &LivePicture) {
+        let (fresh, _) = render_with(&self.sources.scene(), &[Layer::Rgba], &RenderOptions::default());
+        assert!(live.channels == fresh.channels, "{:?}", live.redone);
+    }
+
     fn replace(&mut self, old: &str, new: &str) -> Arc<LivePicture> {
         let texts = self.sources.scripts.iter_mut().map(|(_, text)| text).chain([&mut self.sources.scene]);
         let mut found = 0;
@@ -106,6 +113,18 @@ fn a_line_setting_runs_the_line_pass_and_the_film_alone() {
 }
 
 #[test]
+fn tint_runs_the_line_pass_and_the_film_alone() {
+    let mut desk = Desk::new();
+    desk.replace("normal = 40.0", "normal = 40.0\ncolor = [0.9, 0.3, 0.1]");
+    for (old, new) in [("normal = 40.0", "normal = 40.0\ntint = false"), ("tint = false", "tint = true")] {
+        let tinted = desk.replace(old, new);
+        let redone = &tinted.redone;
+        assert_eq!((rays(&tinted), redone.shaded, redone.restyled), (0, 0, 0), "{redone:?}");
+        assert!(redone.lined == redone.tiles && redone.developed > 0, "{redone:?}");
+    }
+}
+
+#[test]
 fn the_line_width_of_a_script_runs_its_line_slice_alone() {
     let mut desk = Desk::new();
     let wider = desk.replace("line_width: p.ink * hit.uv.x", "line_width: p.ink * hit.uv.y");
@@ -131,6 +150,72 @@ fn a_colour_is_shaded_with_rays_that_are_known() {
 }
 
 #[test]
+fn lists_of_surfaces_are_restyled_and_shaded_with_rays_that_are_known() {
+    let mut desk = Desk::new();
+    let first = desk.replace("normal = 40.0", "normal = 40.0\nsurfaces = 2");
+    assert!(first.redone.traced == first.redone.tiles && first.stats.lines.surfaces_behind > 0, "{:?}", first.redone);
+    let wider = desk.replace("line_width: p.ink * hit.uv.x", "line_width: p.ink * hit.uv.y");
+    assert_eq!((rays(&wider), wider.redone.shaded), (0, 0), "{:?}", wider.redone);
+    assert!(wider.redone.restyled > 0, "{:?}", wider.redone);
+    let wider = desk.replace("normal = 40.0", "normal = 40.0\nmin_width = 1.0");
+    assert_eq!(rays(&wider), 0, "a line setting costs no rays: {:?}", wider.redone);
+    let bluer = desk.replace("rgb(0.8, 0.2, 0.1)", "rgb(0.1, 0.2, 0.8)");
+    assert_eq!((rays(&bluer), bluer.redone.traced), (0, 0), "{:?}", bluer.redone);
+    desk.is_fresh(&bluer);
+}
+
+#[test]
+fn what_glass_shows_is_shaded_with_rays_that_are_known() {
+    let mut desk = Desk::new();
+    let glass = desk.replace("base_color: rgb(0.8, 0.2, 0.1) * hit.normal.y", "transmission: 1.0, roughness: 0.0");
+    assert!(glass.stats.rays.refraction > 0);
+    let lighter = desk.replace("rgb(0.5, 0.5, 0.5)", "rgb(0.7, 0.5, 0.5)");
+    // But for a few that meet an edge, where it depends on shaders which of two triangles is seen.
+    let [few, all] = [&lighter, &glass].map(|picture| picture.stats.rays).map(|rays| rays.reflection + rays.refraction);
+    assert!(lighter.stats.rays.camera == 0 && few * 10 < all, "{few} of {all}");
+    assert_eq!(lighter.redone.traced, 0, "{:?}", lighter.redone);
+    desk.is_fresh(&lighter);
+    let wider = desk.replace("line_width: p.ink * hit.uv.x", "line_width: p.ink * hit.uv.y");
+    assert_eq!((rays(&wider), wider.redone.shaded), (0, 0), "{:?}", wider.redone);
+    desk.is_fresh(&wider);
+}
+
+#[test]
+fn a_colour_under_lines_that_cover_it_leaves_the_lines_alone() {
+    let mut desk = Desk::new();
+    desk.replace("line_width: p.ink * hit.uv.x", "line_width: p.ink");
+    let bluer = desk.replace("rgb(0.8, 0.2, 0.1)", "rgb(0.1, 0.2, 0.8)");
+    assert!(bluer.redone.shaded > 0 && bluer.redone.lined == 0 && bluer.redone.developed > 0, "{:?}", bluer.redone);
+    desk.is_fresh(&bluer);
+    // Thinner than half a pixel, they let it through.
+    desk.replace("line_width: p.ink", "line_width: 0.2");
+    let redder = desk.replace("rgb(0.1, 0.2, 0.8)", "rgb(0.8, 0.2, 0.1)");
+    assert!(redder.redone.lined > 0, "{:?}", redder.redone);
+    desk.is_fresh(&redder);
+}
+
+#[test]
+fn what_the_memory_limit_leaves_out_is_told() {
+    let desk = Desk::new();
+    let picture = |cache_bytes| {
+        let options = SessionOptions { tile: 16, progressive: false, cache_bytes, ..SessionOptions::default() };
+        let session = Session::new(options).unwrap_or_else(|fault| panic!("{fault}"));
+        session.set_scene(desk.sources.setup(&[Layer::Rgba]));
+        session.render().unwrap_or_else(|faults| panic!("{faults}"))
+    };
+    let all = picture(1 << 30);
+    assert_eq!((all.cache.kept, all.cache.limit), (Kept::All, 1 << 30));
+    assert!(all.cache.needed > 100_000, "{:?}", all.cache);
+    let some = picture(all.cache.needed - 1);
+    assert_eq!(some.cache.kept, Kept::Samples);
+    assert!(some.cache.to_string().contains("what rays met is not kept"), "{}", some.cache);
+    let none = picture(1000);
+    assert_eq!(none.cache.kept, Kept::Nothing);
+    assert!(none.cache.to_string().contains("every edit renders all of it again"), "{}", none.cache);
+    assert!(some.channels == all.channels && none.channels == all.channels);
+}
+
+#[test]
 fn a_moved_light_traces_shadow_rays_alone() {
     let mut desk = Desk::new();
     let lit = desk.replace("[-0.5, -0.8, -0.4]", "[0.5, -0.8, -0.4]");
@@ -153,8 +238,7 @@ fn what_an_invisible_surface_sees_of_the_lights_is_its_own() {
     desk.replace("base_color: rgb(0.8, 0.2, 0.1) * hit.normal.y", "opacity: 0.0 * hit.uv.x");
     desk.replace("roughness: 0.0, metallic: 0.5", "color: rgb(0.1, 0.9, 0.5)");
     let lit = desk.replace("color: rgb(0.1, 0.9, 0.5)", "roughness: 1.0");
-    let (fresh, _) = render_with(&desk.sources.scene(), &[Layer::Rgba], &RenderOptions::default());
-    assert!(lit.channels == fresh.channels, "{:?}", lit.redone);
+    desk.is_fresh(&lit);
 }
 
 #[test]
@@ -194,7 +278,10 @@ fn subscribers_hear_complete_pictures_with_ever_more_samples() {
         _ => None,
     });
     let shown: Vec<_> = shown.collect();
-    assert_eq!(shown, [(generation, 1, false), (generation, 2, false), (generation, 4, false), (generation, 5, true)]);
+    assert_eq!(shown.first(), Some(&(generation, 1, false)));
+    assert_eq!(shown.last(), Some(&(generation, 5, true)));
+    // At least twice as many each time; how many more depends on how fast the machine is.
+    assert!(shown.windows(2).all(|two| two[1].1 >= (2 * two[0].1).min(5)), "{shown:?}");
 }
 
 #[test]

@@ -47,7 +47,7 @@ fn read(place: &Workplace, name: &str) -> String {
 fn rows(table: &str) -> Vec<String> {
     let without_times = |line: &str| {
         let cells: Vec<_> = line.split(',').collect();
-        [&cells[..12], &cells[20..]].concat().join(",")
+        [&cells[..13], &cells[21..]].concat().join(",")
     };
     let mut rows: Vec<_> = table.lines().skip(1).map(without_times).collect();
     rows.sort();
@@ -69,7 +69,7 @@ fn a_study_writes_a_table_numbers_pictures_and_a_page() {
     assert_eq!(
         table.lines().next(),
         Some(
-            "scene,reference,samples,method,min_width,width_compensation,surfaces,reflection_depth,refraction_depth,filter,\
+            "scene,reference,samples,sampler,method,min_width,width_compensation,surfaces,reflection_depth,refraction_depth,filter,\
              filter_radius,repeat,threads,wall_seconds,build_seconds,trace_seconds,shade_seconds,lines_seconds,film_seconds,\
              peak_rss_bytes,bytes_per_sample,rmse,rmse_lines,rmse_reflections,rmse_rest,flip,flip_lines,flip_reflections,flip_rest,\
              line_coverage,line_position"
@@ -80,7 +80,7 @@ fn a_study_writes_a_table_numbers_pictures_and_a_page() {
 
     let found = numbers(&place.folder.path().join("out"));
     let keys: Vec<_> = found.as_object().map(|map| map.keys().map(String::as_str).collect()).unwrap_or_default();
-    let expected = "scene size version threads complete left_out_for_time reference knobs knobs_that_do_not_matter points fits fronts presets";
+    let expected = "scene size version threads complete left_out_for_time reference knobs knobs_that_do_not_matter points fits fronts presets drawn_widths";
     assert_eq!(keys.join(" "), expected);
     assert_eq!((&found["complete"], &found["left_out_for_time"]), (&Value::Bool(true), &Value::from(0)));
     let points = found["points"].as_array().expect("there are points");
@@ -224,7 +224,7 @@ fn what_cannot_be_studied_is_told() {
     place.run(&["study", "scene.toml"]).exits(2).says("-o DIR");
     place.run(&["study", "scene.toml", "-o", "a", "-o", "b"]).exits(2).says("one folder");
     place.run(&["study", "scene.toml", "-o", "a", "--lines", "bauer"]).exits(2).says("leave out");
-    place.run(&["study", "scene.toml", "-o", "a", "--knob", "sample"]).exits(2).says("did you mean `samples`?");
+    place.run(&["study", "scene.toml", "-o", "a", "--knob", "sampls"]).exits(2).says("did you mean `samples`?");
     place.run(&["study", "scene.toml", "-o", "a", "--budget", "5"]).exits(2).says("write it with a unit");
     place.run(&["study", "scene.toml", "-o", "a", "--budget", "-5m"]).exits(2);
     place.run(&["study", "scene.toml", "-o", "a", "--budget", "nans"]).exits(2).says("is not a time above 0");

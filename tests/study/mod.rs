@@ -3,3 +3,5 @@
 mod course;
 mod flip;
 mod ladder;
+mod truth;
+mod width;

@@ -11,7 +11,7 @@ use super::super::controls::ControlGroup;
 use super::super::edit::KeyPath;
 use crate::diag::{Diagnostic, Diagnostics, Severity};
 use crate::film::View;
-use crate::live::Redone;
+use crate::live::{Kept, Redone};
 use crate::sample::PixelRect;
 
 /// All that pages show of a scene but its picture.
@@ -90,6 +90,8 @@ pub(in crate::live) fn picture(shown: &ShownPicture, after: Option<Duration>) ->
             "film": seconds.film,
         },
         "redone": redone(&picture.redone),
+        // Only what is wrong with it.
+        "memory": (picture.cache.kept != Kept::All).then(|| picture.cache.to_string()),
         "total": seconds.total,
         "threads": stats.threads,
         "rays": stats.rays,

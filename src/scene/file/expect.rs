@@ -58,6 +58,7 @@ fn describe_array(root: &Json, schema: &Json) -> String {
     match (schema["minItems"].as_u64(), schema["maxItems"].as_u64()) {
         (Some(least), Some(most)) if least == most => format!("an array of {least} {items}"),
         (Some(least), Some(most)) => format!("an array of {least} to {most} {items}"),
+        (Some(least), None) if least > 1 => format!("an array of at least {least} {items}"),
         _ => format!("an array of {items}"),
     }
 }

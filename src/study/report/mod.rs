@@ -4,6 +4,7 @@ mod crops;
 mod page;
 pub mod summary;
 mod svg;
+mod widths;
 
 use std::path::Path;
 
@@ -42,6 +43,11 @@ pub fn json(study: &Study, summary: &Summary) -> Value {
             Some(json!({ "knob": knob.name(), "error": measure.name, "exponent": fit }))
         })
     });
+    let of_samplers = MEASURES.iter().flat_map(|measure| {
+        summary.sampler_fits(study, measure).into_iter().filter_map(|(sampler, fit)| {
+            Some(json!({ "knob": "sampler", "sampler": sampler, "error": measure.name, "exponent": fit? }))
+        })
+    });
     let fronts = MEASURES.iter().map(|measure| {
         let front: Vec<usize> = summary.front(measure).iter().map(|point| point.index).collect();
         (measure.name.to_owned(), json!(front))
@@ -63,15 +69,17 @@ pub fn json(study: &Study, summary: &Summary) -> Value {
         "left_out_for_time": study.left_out,
         "reference": {
             "samples": study.reference,
+            "truth": study.truth,
             "settings": settings(&study.ladder.ideal),
             "own_errors": errors(std::slice::from_ref(&study.own)),
         },
         "knobs": knobs.collect::<Vec<_>>(),
         "knobs_that_do_not_matter": left_out.collect::<Map<_, _>>(),
         "points": summary.points.iter().map(point).collect::<Vec<_>>(),
-        "fits": fits.collect::<Vec<_>>(),
+        "fits": fits.chain(of_samplers).collect::<Vec<_>>(),
         "fronts": fronts.collect::<Map<_, _>>(),
         "presets": presets.collect::<Vec<_>>(),
+        "drawn_widths": study.widths,
     })
 }
 
@@ -97,6 +105,7 @@ fn settings(settings: &Settings) -> Value {
     let short = |value: f32| value.to_string().parse::<f64>().unwrap_or_else(|_| value.into());
     json!({
         "samples": settings.samples,
+        "sampler": settings.sampler.name(),
         "method": method_name(settings.method),
         "min_width": short(settings.min_width),
         "width_compensation": settings.width_compensation,

@@ -5,6 +5,8 @@ use std::fmt::Write as _;
 use super::crops;
 use super::summary::{Fit, MEASURES, Mean, Measure, Point, STAGES, Spread, Summary};
 use super::svg::{Dot, Plot, Power, Series, bars, escape, number, shape};
+use super::widths;
+use crate::scene::settings::Sampler;
 use crate::study::folder::Folder;
 use crate::study::ladder::Knob;
 use crate::study::measure::Errors;
@@ -24,6 +26,8 @@ pub(super) fn page(study: &Study, summary: &Summary, folder: &Folder) -> String 
     let parts = [
         head(study, summary),
         plots(study, summary),
+        samplers(study, summary),
+        widths::section(&study.widths),
         presets(study, summary),
         costs(study, summary),
         pictures(study, summary, folder),
@@ -55,9 +59,15 @@ fn head(study: &Study, summary: &Summary) -> String {
     let _ = writeln!(
         html,
         "<p>Every picture is compared with a reference of {} samples per pixel that has other sample patterns and no approximation \
-         but the filter. Its own errors, estimated from its two halves: {}.</p>",
+         but the filter. Its own errors, estimated from its two halves: {}.{}</p>",
         study.reference,
-        escape(&own.join(", "))
+        escape(&own.join(", ")),
+        if study.truth {
+            " Where lines are and how much of each pixel they cover is known by geometry: the scene declares it in <i>[truth]</i>. \
+             That has no error of its own."
+        } else {
+            ""
+        }
     );
     let _ = writeln!(html, "<h2>What was tried</h2>\n<pre>{}</pre>", escape(&study.ladder.to_string()));
     html
@@ -140,6 +150,7 @@ fn plot<'a>(study: &Study, summary: &Summary, measure: &'a Measure, fit: Option<
                 .filter_map(|point| dot(point, rungs.knob))
                 .collect(),
             joined: is_ladder_of_samples(rungs.knob),
+            faint: false,
         })
         .rev()
         .collect();
@@ -169,6 +180,7 @@ fn plot<'a>(study: &Study, summary: &Summary, measure: &'a Measure, fit: Option<
         powers,
         front: summary.front(measure).iter().filter_map(corner).filter(|[_, error]| *error > 0.0).collect(),
         floor: (measure.of)(&study.own).filter(|floor| *floor > 0.0),
+        least: None,
     }
 }
 
@@ -195,6 +207,71 @@ fn presets(study: &Study, summary: &Summary) -> String {
          <th>coverage</th><th>position, px</th><th>FLIP</th><th>RMSE</th></tr></thead>\n<tbody>\n{}\n</tbody></table></div>\n",
         rows.join("\n")
     )
+}
+
+/// Errors of each sampler against samples.
+fn samplers(study: &Study, summary: &Summary) -> String {
+    let points = summary.of_knob(study, Knob::Sampler);
+    if points.is_empty() {
+        return String::new();
+    }
+    let mut html =
+        "<h2>Samplers</h2>\n<p>The same errors by how samples are spread over the pixels, against samples per pixel. \
+                    Dashed: the ideal N<sup>−0.75</sup>.</p>\n<ul class=\"legend\">"
+            .to_owned();
+    for (kind, sampler) in Sampler::ALL.into_iter().enumerate() {
+        let path = shape(kind);
+        let _ = write!(
+            html,
+            "<li><svg viewBox=\"-8 -6 16 12\"><path class=\"dot k{kind}\" d=\"{path}\"/></svg>{}</li>",
+            sampler.name()
+        );
+    }
+    html.push_str("</ul>\n<div class=\"two\">\n");
+    for measure in &MEASURES {
+        let dot = |point: &&Point| {
+            let values: Vec<f64> = point.errors.iter().filter_map(measure.of).collect();
+            let mean = Mean::of(&values)?.mean;
+            let spread = Spread::of(values);
+            let name = format!("{}: {}", point.settings.value(Knob::Sampler), number(mean));
+            let at = [f64::from(point.settings.samples), mean];
+            (mean > 0.0).then_some(Dot { at, reach: [spread.least, spread.greatest], name, label: None })
+        };
+        let series = Sampler::ALL.into_iter().enumerate().map(|(kind, sampler)| {
+            let own = points.iter().filter(|point| point.settings.sampler == sampler);
+            Series { kind, dots: own.filter_map(dot).collect(), joined: true, faint: false }
+        });
+        let series: Vec<Series> = series.collect();
+        let Some(first) = series.iter().find_map(|series| series.dots.first()) else { continue };
+        let [least, most] = [0, 1].map(|end| {
+            let counts = points.iter().map(|point| f64::from(point.settings.samples));
+            if end == 0 { counts.fold(f64::INFINITY, f64::min) } else { counts.fold(0.0, f64::max) }
+        });
+        let ideal = Power {
+            class: "ideal",
+            slope: IDEAL,
+            at_one: first.at[1] * libm::pow(first.at[0], -IDEAL),
+            from: [least, most],
+            name: format!("ideal: samples^{IDEAL}"),
+        };
+        let plot = Plot {
+            title: measure.title,
+            x: "samples per pixel",
+            y: format!("{} ({})", measure.title, measure.unit),
+            series,
+            powers: vec![ideal],
+            front: Vec::new(),
+            floor: (measure.of)(&study.own).filter(|floor| *floor > 0.0),
+            least: None,
+        };
+        let fits = summary.sampler_fits(study, measure).into_iter().filter_map(|(sampler, fit)| {
+            let fit = fit?;
+            Some(format!("{}: N<sup>{:.2}</sup>", sampler.name(), fit.by_samples))
+        });
+        let caption: Vec<_> = std::iter::once(format!("<b>{}</b>", measure.title)).chain(fits).collect();
+        let _ = writeln!(html, "<figure>{}<figcaption>{}</figcaption></figure>", plot.svg(), caption.join(" · "));
+    }
+    html + "</div>\n"
 }
 
 fn costs(study: &Study, summary: &Summary) -> String {

@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use crate::scene::settings::Sampler;
 use crate::study::ladder::{Knob, Settings};
 use crate::study::measure::Errors;
 use crate::study::run::Study;
@@ -184,30 +185,15 @@ impl Summary {
     /// it, and there must be three others.
     #[must_use]
     pub fn fit(&self, study: &Study, knob: Knob, measure: &Measure) -> Option<Fit> {
-        let floor = (measure.of)(&study.own).unwrap_or(0.0);
-        let points = self.of_knob(study, knob);
-        let usable: Vec<[f64; 3]> = points
-            .iter()
-            .filter_map(|point| {
-                let error = point.error(measure.of)?.mean;
-                let seconds = point.cpu.median;
-                let tells = error > 3.0 * floor && error > 0.0 && seconds > 0.0;
-                tells.then(|| [libm::log(f64::from(point.settings.samples)), libm::log(seconds), libm::log(error)])
-            })
-            .collect();
-        if usable.len() < 3 {
-            return None;
-        }
-        let line = |axis: usize| {
-            let count = usable.len() as f64;
-            let [x, y] = [axis, 2].map(|axis| usable.iter().map(|point| point[axis]).sum::<f64>() / count);
-            let product: f64 = usable.iter().map(|point| (point[axis] - x) * (point[2] - y)).sum();
-            let slope = product / usable.iter().map(|point| (point[axis] - x) * (point[axis] - x)).sum::<f64>();
-            (slope, y - slope * x)
-        };
-        let ((by_samples, _), (by_seconds, at)) = (line(0), line(1));
-        Some(Fit { by_samples, by_seconds, at_one_second: libm::exp(at), points: usable.len() })
-            .filter(|fit| fit.by_samples.is_finite() && fit.by_seconds.is_finite())
+        fitted(&self.of_knob(study, knob), study, measure)
+    }
+
+    /// The same for each sampler, along its part of their ladder.
+    #[must_use]
+    pub fn sampler_fits(&self, study: &Study, measure: &Measure) -> Vec<(Sampler, Option<Fit>)> {
+        let points = self.of_knob(study, Knob::Sampler);
+        let of = |sampler| points.iter().copied().filter(|point| point.settings.sampler == sampler).collect::<Vec<_>>();
+        Sampler::ALL.into_iter().map(|sampler| (sampler, fitted(&of(sampler), study, measure))).collect()
     }
 
     /// How far a point lies behind the front: the largest factor by which another point is both faster and nearer to the
@@ -235,6 +221,33 @@ impl Summary {
         });
         points
     }
+}
+
+/// How an error falls over points of rising samples.
+fn fitted(points: &[&Point], study: &Study, measure: &Measure) -> Option<Fit> {
+    let floor = (measure.of)(&study.own).unwrap_or(0.0);
+    let usable: Vec<[f64; 3]> = points
+        .iter()
+        .filter_map(|point| {
+            let error = point.error(measure.of)?.mean;
+            let seconds = point.cpu.median;
+            let tells = error > 3.0 * floor && error > 0.0 && seconds > 0.0;
+            tells.then(|| [libm::log(f64::from(point.settings.samples)), libm::log(seconds), libm::log(error)])
+        })
+        .collect();
+    if usable.len() < 3 {
+        return None;
+    }
+    let line = |axis: usize| {
+        let count = usable.len() as f64;
+        let [x, y] = [axis, 2].map(|axis| usable.iter().map(|point| point[axis]).sum::<f64>() / count);
+        let product: f64 = usable.iter().map(|point| (point[axis] - x) * (point[2] - y)).sum();
+        let slope = product / usable.iter().map(|point| (point[axis] - x) * (point[axis] - x)).sum::<f64>();
+        (slope, y - slope * x)
+    };
+    let ((by_samples, _), (by_seconds, at)) = (line(0), line(1));
+    Some(Fit { by_samples, by_seconds, at_one_second: libm::exp(at), points: usable.len() })
+        .filter(|fit| fit.by_samples.is_finite() && fit.by_seconds.is_finite())
 }
 
 #[cfg(test)]

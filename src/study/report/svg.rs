@@ -25,6 +25,8 @@ pub struct Series {
     pub dots: Vec<Dot>,
     /// Whether a line joins them.
     pub joined: bool,
+    /// Whether they are only to be compared with.
+    pub faint: bool,
 }
 
 /// A straight line y = `at_one` · x^`slope`, from one x to another.
@@ -57,6 +59,8 @@ pub struct Plot<'a> {
     pub front: Vec<[f64; 2]>,
     /// Below this, numbers mean little.
     pub floor: Option<f64>,
+    /// The least y that is shown; lower dots are left out, lines cut.
+    pub least: Option<f64>,
 }
 
 const WIDTH: f64 = 560.0;
@@ -142,7 +146,9 @@ impl Plot<'_> {
         // A floor far below all dots is not worth the room.
         let least = dots().map(|dot| dot.at[1]).fold(f64::INFINITY, f64::min);
         let floor = self.floor.filter(|floor| *floor > least / 8.0);
-        let y = Axis::new(dots().flat_map(|dot| [dot.at[1], dot.reach[1]]).chain(floor), HEIGHT - BOTTOM, TOP);
+        let lowest = self.least.unwrap_or(0.0);
+        let shown = dots().flat_map(|dot| [dot.at[1], dot.reach[1]]).chain(floor).map(|value| value.max(lowest));
+        let y = Axis::new(shown, HEIGHT - BOTTOM, TOP);
         let mut svg = format!(
             "<svg class=\"plot\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\" aria-label=\"{}\">\n",
             escape(self.title)
@@ -228,12 +234,13 @@ impl Plot<'_> {
             ));
         }
         for series in &self.series {
+            let faint = if series.faint { " faint" } else { "" };
             if series.joined {
                 let places = series.dots.iter().map(|dot| format!("{:.1} {:.1}", x.at(dot.at[0]), y.at(dot.at[1])));
                 let path = places.collect::<Vec<_>>().join("L");
-                put(format!("<path class=\"joint k{}\" d=\"M{path}\"/>", series.kind));
+                put(format!("<path class=\"joint{faint} k{}\" d=\"M{path}\"/>", series.kind));
             }
-            for dot in &series.dots {
+            for dot in series.dots.iter().filter(|dot| dot.at[1] >= lowest) {
                 let (px, py) = (x.at(dot.at[0]), y.at(dot.at[1]));
                 let [low, high] = dot.reach.map(|value| y.at(value));
                 if (low - high).abs() > 1.0 {
@@ -241,7 +248,7 @@ impl Plot<'_> {
                 }
                 let title = escape(&dot.name);
                 put(format!(
-                    "<path class=\"dot k{}\" transform=\"translate({px:.1} {py:.1})\" d=\"{}\"><title>{title}</title></path>",
+                    "<path class=\"dot{faint} k{}\" transform=\"translate({px:.1} {py:.1})\" d=\"{}\"><title>{title}</title></path>",
                     series.kind,
                     shape(series.kind)
                 ));
@@ -263,7 +270,7 @@ impl Plot<'_> {
 /// The outline of a dot, so that kinds can be told apart without colours.
 #[must_use]
 pub fn shape(kind: usize) -> &'static str {
-    match kind % 9 {
+    match kind % 10 {
         0 => "M-4 0A4 4 0 1 1 4 0A4 4 0 1 1 -4 0Z",
         1 => "M-4 -4H4V4H-4Z",
         2 => "M0 -5L5 0L0 5L-5 0Z",
@@ -272,7 +279,8 @@ pub fn shape(kind: usize) -> &'static str {
         5 => "M-1.5 -5H1.5V-1.5H5V1.5H1.5V5H-1.5V1.5H-5V-1.5H-1.5Z",
         6 => "M-5 0L4 -5V5Z",
         7 => "M5 0L-4 -5V5Z",
-        _ => "M-4.5 -1.5L0 -5L4.5 -1.5L3 4.5H-3Z",
+        8 => "M-4.5 -1.5L0 -5L4.5 -1.5L3 4.5H-3Z",
+        _ => "M-4 -2L-2 -4L4 2L2 4ZM2 -4L4 -2L-2 4L-4 2Z",
     }
 }
 
@@ -327,8 +335,9 @@ mod tests {
     #[test]
     fn plots_of_nothing_and_of_one_dot_are_plots() {
         let plot = |dots: Vec<Dot>| {
-            let series = vec![Series { kind: 0, dots, joined: true }];
-            Plot { title: "t", x: "x", y: "y".into(), series, powers: vec![], front: vec![], floor: Some(1e-9) }.svg()
+            let series = vec![Series { kind: 0, dots, joined: true, faint: false }];
+            let (powers, front) = (vec![], vec![]);
+            Plot { title: "t", x: "x", y: "y".into(), series, powers, front, floor: Some(1e-9), least: None }.svg()
         };
         for svg in [plot(vec![]), plot(vec![Dot { at: [1.0, 0.0], reach: [0.0; 2], name: "<".into(), label: None }])] {
             assert!(!svg.contains("NaN") && !svg.contains("inf") && !svg.contains("<title><"), "{svg}");

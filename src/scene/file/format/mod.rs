@@ -6,6 +6,7 @@
 //! `x-planned` names values and keys that are designed but not built, each with what to do instead.
 
 mod lines;
+mod truth;
 
 use std::collections::BTreeMap;
 
@@ -13,6 +14,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 pub(super) use self::lines::{Compose, LinePath, Lines, MaterialLines, Threshold};
+pub(super) use self::truth::{Truth, TruthDisc, TruthEdge};
 use crate::scene::check::{MAX_SAMPLES, MAX_SIZE};
 use crate::scene::shape::MAX_SEGMENTS;
 
@@ -39,6 +41,8 @@ pub(super) struct SceneFile {
     pub materials: BTreeMap<String, Material>,
     /// The objects: models and built-in shapes with a place in the world.
     pub objects: Vec<Object>,
+    /// The lines that the picture must show, known by geometry: what `tusche study` measures lines against.
+    pub truth: Option<Truth>,
     /// The lights. Without any, those of the models are used, and failing those, a default set; `lights = []` is dark.
     pub lights: Vec<Light>,
 }
@@ -53,6 +57,8 @@ pub(super) struct Render {
     /// Samples per pixel.
     #[schemars(range(min = 1, max = MAX_SAMPLES))]
     pub samples: u32,
+    /// How samples are spread over a pixel.
+    pub sampler: Sampler,
     /// Chooses the sample positions; the same seed gives the same picture, bit for bit.
     pub seed: u64,
     /// What rays that leave the scene see.
@@ -80,6 +86,7 @@ impl Default for Render {
         Self {
             size: [1280, 720],
             samples: 16,
+            sampler: Sampler::Stratified,
             seed: 0,
             background: Background::Color(Color([0.9; 3])),
             ambient: Ambient::Gray(0.2),
@@ -144,6 +151,18 @@ pub(super) struct BackgroundImage {
     #[serde(default = "one")]
     #[schemars(range(min = 0, max = BRIGHT))]
     pub strength: f64,
+}
+
+/// How samples are spread over a pixel.
+#[derive(Clone, Copy, Debug, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum Sampler {
+    /// Each somewhere in a cell of its own.
+    Stratified,
+    /// Points of an Owen-scrambled Sobol sequence; best for 1, 2, 4, 8, 16, … samples.
+    Sobol,
+    /// The same from one sequence for all pixels, so that neighbours make up for each other's errors.
+    BlueNoise,
 }
 
 /// A pixel filter.
@@ -355,12 +374,13 @@ pub(super) enum TextureFilter {
 /// A model or a built-in shape with a place in the world.
 #[derive(Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-#[schemars(extend("x-planned" = { "mesh": "convert the model to glTF, and use `gltf = \"model.glb\"`" }))]
 pub(super) struct Object {
     /// Its name, for messages and `--set objects.NAME.…`. Default: the name of the model or shape.
     pub name: Option<String>,
     /// Path of a glTF model: `.gltf` or `.glb`.
     pub gltf: Option<String>,
+    /// Path of a mesh: `.obj` or `.ply`. Of it only the shape is used; `material` says what it looks like.
+    pub mesh: Option<String>,
     /// A built-in shape, instead of a model. By default each is centred and fits the cube from -1 to 1; y is its axis.
     pub shape: Option<Shape>,
     /// Edge lengths of a box (x, y, z) or a plane (x, z); one number for all. Default: 2.

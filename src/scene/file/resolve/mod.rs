@@ -9,6 +9,7 @@ mod material;
 mod object;
 mod settings;
 mod transform;
+mod truth;
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -48,6 +49,7 @@ pub(super) fn resolve(file: &SceneFile, node: &Node, context: Context<'_>, fault
         scene: SceneBuilder::default(),
         images: Vec::new(),
         shapes: Vec::new(),
+        meshes: Vec::new(),
         materials: Vec::new(),
         default_material: None,
         model_cameras: Vec::new(),
@@ -66,6 +68,7 @@ pub(super) fn resolve(file: &SceneFile, node: &Node, context: Context<'_>, fault
     resolver.lights(&file.lights, model_lights);
     resolver.cameras(file);
     resolver.fill_in();
+    resolver.truth(file);
     resolver.scene
 }
 
@@ -79,6 +82,8 @@ struct Resolver<'a> {
     images: Vec<(PathBuf, bool, Arc<Image>)>,
     /// Shapes with equal parameters share a mesh.
     shapes: Vec<(Shape, MeshId)>,
+    /// Meshes from files; those of one file share one.
+    meshes: Vec<(PathBuf, MeshId)>,
     /// The materials of the file by name.
     materials: Vec<(String, MaterialId)>,
     /// What objects without a material get, made when the first needs it.

@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
+use std::sync::Arc;
 
 use super::super::document::Node;
 use super::super::format::{self, Segments, Size};
@@ -15,8 +16,12 @@ use crate::scene::attributes::{Attribute, AttributeSet};
 use crate::scene::gltf::{self, ModelTime, Placement};
 use crate::scene::ids::{MeshId, ObjectId};
 use crate::scene::light::Light;
+use crate::scene::mesh_file;
 use crate::scene::settings::RayKinds;
 use crate::scene::shape::Shape;
+
+/// What an object may be.
+const KINDS: [&str; 3] = ["gltf", "mesh", "shape"];
 
 impl Resolver<'_> {
     /// Adds all objects; returns the lights of those models whose lights are to be used.
@@ -31,24 +36,27 @@ impl Resolver<'_> {
                 let hint = "objects with equal group names count as one; leave `group` out for an object of its own";
                 self.faults.push(fault.at(node.span_of("group")).hint(hint));
             }
-            match (&object.gltf, object.shape) {
-                (Some(model), None) if !node.mentions("shape") => {
+            let kinds: Vec<&str> = KINDS.into_iter().filter(|kind| node.mentions(kind)).collect();
+            match (&kinds[..], &object.gltf, &object.mesh, object.shape) {
+                (["gltf"], Some(model), ..) => {
                     let found = self.model(model, object, node, name);
                     if object.lights.unwrap_or(lights_by_default) {
                         lights.extend(found);
                     }
                 }
-                (None, Some(shape)) if !node.mentions("gltf") => self.shape(shape, object, node, name),
-                (Some(_), Some(_)) => {
-                    let fault = Diagnostic::error(format!("object `{name}` has both `gltf` and `shape`"));
-                    self.faults.push(fault.at(node.key_span("shape")).hint("make two objects of it"));
-                }
-                _ if node.mentions("gltf") || node.mentions("shape") || node.mentions("mesh") => {}
-                _ => {
-                    let fault = Diagnostic::error(format!("object `{name}` has neither `gltf` nor `shape`"));
-                    let hint = "say what it is: `shape = \"sphere\"` or `gltf = \"model.glb\"`";
+                (["mesh"], _, Some(mesh), _) => self.mesh(mesh, object, node, name),
+                (["shape"], .., Some(shape)) => self.shape(shape, object, node, name),
+                ([], ..) => {
+                    let fault = Diagnostic::error(format!("object `{name}` has neither `gltf` nor `mesh` nor `shape`"));
+                    let hint = "say what it is: `shape = \"sphere\"`, `gltf = \"model.glb\"` or `mesh = \"mesh.obj\"`";
                     self.faults.push(fault.at(node.span.clone()).hint(hint));
                 }
+                ([first, second, ..], ..) => {
+                    let fault = Diagnostic::error(format!("object `{name}` has both `{first}` and `{second}`"));
+                    self.faults.push(fault.at(node.key_span(second)).hint("make two objects of it"));
+                }
+                // What is written there has been told to be wrong.
+                _ => {}
             }
         }
         lights
@@ -64,7 +72,7 @@ impl Resolver<'_> {
             }
             return name.clone();
         }
-        let kind = match (&object.gltf, object.shape) {
+        let kind = match (object.gltf.as_ref().or(object.mesh.as_ref()), object.shape) {
             (Some(model), _) => Path::new(model).file_stem().map(|stem| stem.to_string_lossy().into_owned()),
             (None, Some(shape)) => Some(built_in(shape).name().to_owned()),
             (None, None) => None,
@@ -73,11 +81,7 @@ impl Resolver<'_> {
     }
 
     fn model(&mut self, written: &str, object: &format::Object, node: &Node, name: String) -> Vec<Light> {
-        for key in ["size", "radius", "height", "tube_radius", "segments"] {
-            if node.mentions(key) {
-                self.fault(format!("`{key}` belongs to a shape, not to a model"), node.key_span(key));
-            }
-        }
+        self.no_parameters(node, "model");
         let world_from_model = world_from_object(object, node, self.faults);
         let material = match &object.material {
             Some(name) => match self.material(name, &node.span_of("material")) {
@@ -120,12 +124,48 @@ impl Resolver<'_> {
         faults.0.into_iter().for_each(|fault| self.faults.push(about_file(fault, span)));
     }
 
+    /// Tells of parameters of shapes at something that is none.
+    fn no_parameters(&mut self, node: &Node, what: &str) {
+        for key in ["size", "radius", "height", "tube_radius", "segments"] {
+            if node.mentions(key) {
+                self.fault(format!("`{key}` belongs to a shape, not to a {what}"), node.key_span(key));
+            }
+        }
+    }
+
+    fn mesh(&mut self, written: &str, object: &format::Object, node: &Node, name: String) {
+        self.no_parameters(node, "mesh");
+        let span = node.span_of("mesh");
+        let path = self.path(written, &span);
+        let mesh = match self.meshes.iter().find(|(known, _)| *known == path) {
+            Some((_, id)) => Some(*id),
+            None => match mesh_file::read(&path, self.context.files) {
+                Ok(mesh) => {
+                    let id = self.scene.add_mesh(Arc::unwrap_or_clone(mesh));
+                    self.meshes.push((path, id));
+                    Some(id)
+                }
+                Err(fault) => {
+                    let fault = about_file(fault, &span);
+                    self.faults.push(if fault.span.is_none() { fault.at(span) } else { fault });
+                    None
+                }
+            },
+        };
+        self.place(mesh, object, node, name, "mesh");
+    }
+
     fn shape(&mut self, kind: format::Shape, object: &format::Object, node: &Node, name: String) {
+        let mesh = self.shape_mesh(kind, object, node);
+        self.place(mesh, object, node, name, "shape");
+    }
+
+    /// Adds the object of a mesh, unless something is wrong with it.
+    fn place(&mut self, mesh: Option<MeshId>, object: &format::Object, node: &Node, name: String, what: &str) {
         if node.mentions("lights") {
-            self.fault("`lights` belongs to a model, not to a shape", node.key_span("lights"));
+            self.fault(format!("`lights` belongs to a model, not to a {what}"), node.key_span("lights"));
         }
         let world_from_object = world_from_object(object, node, self.faults);
-        let mesh = self.shape_mesh(kind, object, node);
         let material = match &object.material {
             Some(name) => self.material(name, &node.span_of("material")),
             None if node.mentions("material") => None,

@@ -11,7 +11,7 @@ use crate::scene::check::MAX_PIXELS;
 use crate::scene::ids::ObjectId;
 use crate::scene::settings::{
     Background, Composition, FilterKind, HiddenLines, LineOverrides, LineSettings, LineType, RayKinds, RenderSettings,
-    TypeStyle,
+    Sampler, TypeStyle,
 };
 use crate::scene::texture::{Texture, TextureFilter, Wrap};
 
@@ -43,6 +43,11 @@ impl Resolver<'_> {
         self.scene.render = RenderSettings {
             size: render.size,
             samples: render.samples,
+            sampler: match render.sampler {
+                format::Sampler::Stratified => Sampler::Stratified,
+                format::Sampler::Sobol => Sampler::Sobol,
+                format::Sampler::BlueNoise => Sampler::BlueNoise,
+            },
             seed: render.seed,
             background,
             ambient: match render.ambient {

@@ -5,6 +5,10 @@
 //! whose roughness is at most [`MIRROR_ROUGHNESS`] mirrors like a perfect mirror and a rougher one sees only lights
 //! and a blurred guess of the background; and refraction is always sharp, whatever the roughness.
 
+mod lanes;
+
+pub use lanes::{BsdfLanes, LANES, LightLanes};
+
 use std::f32::consts::PI;
 
 use crate::math::{Vec3, portable};
@@ -62,7 +66,7 @@ impl Bsdf {
         self
     }
 
-    fn is_mirror(&self) -> bool {
+    pub(crate) fn is_mirror(&self) -> bool {
         self.roughness <= MIRROR_ROUGHNESS
     }
 
