@@ -24,6 +24,7 @@ mod trace;
 mod flicker;
 mod live;
 mod same_bits;
+mod sampling;
 mod session;
 mod stability;
 mod study;

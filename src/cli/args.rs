@@ -4,12 +4,14 @@ use std::path::PathBuf;
 use std::str::FromStr;
 use std::time::Duration;
 
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use crate::line::Method;
+use crate::render::ErrorGoal;
 use crate::sample::PixelRect;
 use crate::shade::ShadingMode;
-use crate::study::Knob;
+use crate::study::{Knob, Quality};
 
 /// Draws feature lines of ray-traced scenes, styled by Rhai scripts.
 #[derive(Debug, Parser)]
@@ -82,6 +84,14 @@ pub struct RenderArguments {
     /// Side of a tile in pixels; changes memory and speed, never the picture.
     #[arg(long, value_name = "N", default_value_t = 32, value_parser = clap::value_parser!(u32).range(1..=4096))]
     pub tile: u32,
+    /// Renders with as many samples as fit into this time: 10, 10s, 1m30 (loading included). Says which --samples makes the
+    /// same picture.
+    #[arg(long, value_name = "T", value_parser = seconds, conflicts_with_all = ["samples", "quality", "error"])]
+    pub time: Option<Duration>,
+    /// Samples each part of the picture until its estimated error of colours and lines (0 to 1, root mean square) is below
+    /// this, for example 0.02.
+    #[arg(long, value_name = "E", value_parser = error, allow_negative_numbers = true, conflicts_with_all = ["samples", "quality"])]
+    pub error: Option<f64>,
     /// Writes what the picture cost as JSON.
     #[arg(long, value_name = "FILE.json")]
     pub stats: Option<PathBuf>,
@@ -199,8 +209,9 @@ pub struct SceneArguments {
     /// Samples per pixel.
     #[arg(long, value_name = "N")]
     pub samples: Option<u32>,
-    /// A sample rate by name, where --samples gives none: 4, 16 or 64.
-    #[arg(long, value_name = "Q", conflicts_with = "samples")]
+    /// How accurate, from measured fronts of accuracy against time: draft, preview or final are 4, 16 or 64 samples per pixel.
+    /// `tusche explain --quality Q` says what it costs.
+    #[arg(long, value_name = "Q", conflicts_with = "samples", value_parser = quality())]
     pub quality: Option<Quality>,
     /// Chooses the sample positions.
     #[arg(long, value_name = "N")]
@@ -253,6 +264,46 @@ fn tolerance(text: &str) -> Result<f64, String> {
     }
 }
 
+fn quality() -> impl TypedValueParser<Value = Quality> {
+    PossibleValuesParser::new(Quality::ALL.map(Quality::name)).try_map(|name| name.parse::<Quality>())
+}
+
+fn error(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(error) if (ErrorGoal::LEAST..1.0).contains(&error) => Ok(error),
+        Ok(error) if error > 0.0 && error < 1.0 => {
+            Err(format!("{} is the least: less cannot be reached with {} samples", ErrorGoal::LEAST, ErrorGoal::MOST))
+        }
+        _ => Err("it must be a number above 0 and below 1, for example 0.02".into()),
+    }
+}
+
+/// A time as people write it: `90`, `90s`, `1m30`, `1h`.
+fn seconds(text: &str) -> Result<Duration, String> {
+    let fault = || format!("`{text}` is not a time above 0; write it as 10, 10s or 1m30");
+    let (mut rest, mut total, mut last) = (text.trim(), 0.0, f64::INFINITY);
+    while !rest.is_empty() {
+        let end = rest.find(|c: char| !c.is_ascii_digit() && c != '.').unwrap_or(rest.len());
+        let number: f64 = rest[..end].parse().map_err(|_| fault())?;
+        let unit = match rest[end..].chars().next() {
+            Some('h') => 3600.0,
+            Some('m') => 60.0,
+            Some('s') => 1.0,
+            // A bare number is of seconds, or of the next smaller unit after another.
+            None if last == 3600.0 => 60.0,
+            None => 1.0,
+            Some(_) => return Err(fault()),
+        };
+        if unit >= last {
+            return Err(fault());
+        }
+        total += number * unit;
+        last = unit;
+        rest = rest.get(end + 1..).unwrap_or_default();
+    }
+    Duration::try_from_secs_f64(total).ok().filter(|time| !time.is_zero()).ok_or_else(fault)
+}
+
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum LineMode {
     Off,
@@ -286,23 +337,6 @@ impl Shading {
             Self::Auto => ShadingMode::Auto,
             Self::Kernel => ShadingMode::Kernel,
             Self::Interpreter => ShadingMode::Interpreter,
-        }
-    }
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Quality {
-    Draft,
-    Preview,
-    Final,
-}
-
-impl Quality {
-    pub fn samples(self) -> u32 {
-        match self {
-            Self::Draft => 4,
-            Self::Preview => 16,
-            Self::Final => 64,
         }
     }
 }
@@ -420,5 +454,26 @@ impl FromStr for FrameRange {
             return Err(format!("the last frame, {last}, comes before the first, {first}"));
         }
         Ok(Self { first, last })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_are_read_as_people_write_them() {
+        let read = |text| seconds(text).ok().map(|time| time.as_secs_f64());
+        let times =
+            [("5", 5.0), ("5s", 5.0), ("0.5", 0.5), ("1m30", 90.0), ("1m30s", 90.0), ("2m", 120.0), ("1h", 3600.0)];
+        for (text, expected) in times {
+            assert_eq!(read(text), Some(expected), "{text}");
+        }
+        assert_eq!((read("1h30"), read("1h0m5")), (Some(5400.0), Some(3605.0)));
+        for text in
+            ["", "0", "s", "-5", "5x", "1s2m", "1m1m", "nan", "inf", "1e5", "1..2", "5 5", "é", "99999999999999999999h"]
+        {
+            assert_eq!(read(text), None, "{text}");
+        }
     }
 }

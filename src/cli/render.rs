@@ -10,7 +10,11 @@ use super::request::{Request, output_paths};
 use super::{Failure, terminal};
 use crate::diag::{Diagnostic, Diagnostics};
 use crate::film::{check_writable, write_atomically};
-use crate::render::{Control, RenderOptions, Report, render_files};
+use crate::plan::Plan;
+use crate::render::refine::{BLOCK, Rate, measured_layers};
+use crate::render::stats::Sampling;
+use crate::render::timed::choose_samples;
+use crate::render::{Control, ErrorGoal, RenderOptions, Report, layers_of, render_files, render_files_to_error};
 use crate::sample::PixelRect;
 
 pub(super) fn run(arguments: &RenderArguments) -> Result<(), Failure> {
@@ -55,7 +59,7 @@ fn render_frame(
     cancel: &AtomicBool,
 ) -> Result<(), Failure> {
     let start = Instant::now();
-    let request = Request::new(&arguments.scene, frame, outputs)?;
+    let mut request = Request::new(&arguments.scene, frame, outputs)?;
     let size = request.scene.render().size;
     let picture = PixelRect::of_size(size);
     let crop = arguments.crop.map_or(picture, |crop| crop.0);
@@ -77,15 +81,89 @@ fn render_frame(
         crop: Some(crop),
         method: arguments.scene.lines.method(),
     };
-    let advance = |share| progress.set(share);
-    let control = Control { cancel: Some(cancel), progress: Some(&advance) };
-    let Request { scene, shaders, plan, files, load_seconds } = &request;
-    let result = render_files(scene, shaders, plan, files, &options, &control);
+    let time = arguments.time.map(|time| (time.as_secs_f64(), start));
+    let result = render_request(&mut request, arguments.error, time, &options, cancel, &progress);
     progress.done();
     let mut report = result?;
-    report.stats.seconds.load = *load_seconds;
+    report.stats.seconds.load = request.load_seconds;
     report.stats.seconds.total = start.elapsed().as_secs_f64();
     conclude(arguments, &request, stats, report)
+}
+
+/// Renders with the scene's samples, to an error, or within a time from a start.
+fn render_request(
+    request: &mut Request,
+    error: Option<f64>,
+    time: Option<(f64, Instant)>,
+    options: &RenderOptions,
+    cancel: &AtomicBool,
+    progress: &terminal::Progress,
+) -> Result<Report, Failure> {
+    let advance = |share| progress.set(share);
+    let timed = |_| time.iter().for_each(|(seconds, start)| progress.set(start.elapsed().as_secs_f64() / seconds));
+    let control = Control { cancel: Some(cancel), progress: Some(if time.is_some() { &timed } else { &advance }) };
+    let layers = layers_of(&request.files);
+    let mut choice = None;
+    if let Some(time) = time {
+        // Before time goes into finding out what fits.
+        request.files.iter().try_for_each(|file| check_writable(&file.path))?;
+        let chosen = choose_samples(&request.scene, &request.shaders, &layers, time, options, &control)?;
+        let chosen = *choice.insert(chosen.ok_or_else(stopped_early)?);
+        request.scene = request.scene.with_samples(chosen.samples);
+        request.plan = Plan::new(&request.scene, &request.shaders, &layers);
+    }
+    if error.is_some() {
+        request.plan = Plan::new(&request.scene, &request.shaders, &measured_layers(&layers));
+    }
+    let Request { scene, shaders, plan, files, .. } = request;
+    let mut report = match error {
+        Some(error) => {
+            let goal = ErrorGoal { error, most: ErrorGoal::MOST };
+            render_files_to_error(scene, shaders, plan, files, &goal, options, &control)?
+        }
+        None => render_files(scene, shaders, plan, files, options, &control)?,
+    };
+    if let Some(choice) = choice {
+        report.stats.sampling = Some(Sampling::Time(choice));
+    }
+    Ok(report)
+}
+
+fn stopped_early() -> Diagnostics {
+    let fault = Diagnostic::error("stopped before the picture was complete");
+    fault.hint("nothing was done yet, and nothing was written").into()
+}
+
+/// What to say of how samples were chosen.
+fn told(sampling: &Sampling) -> String {
+    match sampling {
+        Sampling::Time(choice) => format!(
+            "{} samples per pixel fit into {} s, of which {:.1} s went into finding that out; --samples {} makes the same picture",
+            choice.samples, choice.asked_seconds, choice.pilot_seconds, choice.samples
+        ),
+        Sampling::Error(found) => {
+            let pixels: u64 = found.rates.iter().map(|rate| rate.pixels).sum();
+            let share = |rate: &Rate| 100.0 * rate.pixels as f64 / (pixels as f64).max(1.0);
+            let rates = found.rates.iter().map(|rate| format!("{} in {:.1} %", rate.samples, share(rate)));
+            let rates: Vec<_> = rates.collect();
+            format!("samples per pixel: {} of the picture, {:.1} in the mean", rates.join(", "), found.mean_samples)
+        }
+    }
+}
+
+/// What did not go as asked for.
+fn shortfall(sampling: &Sampling) -> Option<Diagnostic> {
+    let Sampling::Error(found) = sampling else { return None };
+    if found.unfinished_blocks == 0 {
+        return None;
+    }
+    let (count, most) = (found.unfinished_blocks, ErrorGoal::MOST);
+    let parts = if count == 1 { "part" } else { "parts" };
+    let fault = Diagnostic::warning(format!(
+        "{count} {parts} of {BLOCK} x {BLOCK} pixels did not reach an error of {} with {most} samples per pixel: the largest is {:.4}",
+        found.error, found.largest_error
+    ));
+    Some(fault.hint("ask for a larger --error, or take a larger picture, in which detail is coarser"))
 }
 
 /// Says what happened, writes `--stats`, and decides about success.
@@ -103,6 +181,11 @@ fn conclude(
         terminal::say(&report.warnings);
     }
     if !quiet && report.written {
+        if let Some(sampling) = &report.stats.sampling {
+            terminal::note(&told(sampling));
+            let short = shortfall(sampling).filter(|_| report.complete);
+            short.into_iter().for_each(|fault| terminal::say(&fault.into()));
+        }
         for file in &request.files {
             terminal::note(&format!("wrote {} ({:.1} s)", file.path.display(), report.stats.seconds.total));
         }
@@ -114,10 +197,13 @@ fn conclude(
     if !report.complete {
         let files: Vec<String> = request.files.iter().map(|file| file.path.display().to_string()).collect();
         let fault = Diagnostic::error("stopped before the picture was complete");
-        let fault = if report.written {
-            fault.hint(format!("what is done is in {}; the rest is transparent black", files.join(" and ")))
-        } else {
-            fault.hint("nothing was done yet, and nothing was written")
+        let files = files.join(" and ");
+        let fault = match (report.written, &report.stats.sampling) {
+            (false, _) => fault.hint("nothing was done yet, and nothing was written"),
+            (true, Some(Sampling::Error(_))) => {
+                fault.hint(format!("what is in {files} is not as accurate everywhere as was asked for"))
+            }
+            (true, _) => fault.hint(format!("what is done is in {files}; the rest is transparent black")),
         };
         let fault = fault.hint("run the same command again for the whole picture");
         return Err(Diagnostics::from(fault).into());

@@ -78,11 +78,17 @@ fn place(path: &Path) -> PathBuf {
 /// What to load.
 pub(super) fn scene_request(arguments: &SceneArguments, frame: Option<f64>) -> Result<SceneRequest, Failure> {
     // Flags that stand for values of the scene file go the same way as `--set`, so that they are checked the same way.
-    let mut changes = arguments.set.clone();
+    let mut changes = Vec::new();
+    if let Some(quality) = arguments.quality {
+        // First, so that what is set by itself has the last word.
+        changes.push("lines.width_compensation=true".to_owned());
+        changes.push(format!("render.samples={}", quality.samples()));
+    }
+    changes.extend(arguments.set.iter().cloned());
     if let Some(Size([width, height])) = arguments.size {
         changes.push(format!("render.size=[{width}, {height}]"));
     }
-    if let Some(samples) = arguments.samples.or(arguments.quality.map(|quality| quality.samples())) {
+    if let Some(samples) = arguments.samples {
         changes.push(format!("render.samples={samples}"));
     }
     if let Some(seed) = arguments.seed {

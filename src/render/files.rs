@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-use super::{Control, RenderOptions, Report, render};
+use super::{Control, Emit, ErrorGoal, RenderOptions, Report, render, render_to_error};
 use crate::clock::CpuClock;
 use crate::diag::Diagnostic;
 use crate::film::{FilmTile, Layer, Output, OutputSettings};
@@ -45,14 +45,49 @@ pub fn render_files(
     options: &RenderOptions,
     control: &Control<'_>,
 ) -> Result<Report, Diagnostic> {
-    let start = Instant::now();
     let settings = scene.render();
+    let samples = ("samples", settings.samples.to_string());
+    into_files(settings, &plan.layers, files, options.crop, samples, |emit| {
+        render(scene, shaders, plan, options, control, emit)
+    })
+}
+
+/// The same to an error instead of with the scene's samples: see [`render_to_error`]. The plan must be made for the layers
+/// of [`measured_layers`](super::refine::measured_layers).
+///
+/// # Errors
+/// As [`render_files`].
+pub fn render_files_to_error(
+    scene: &Scene,
+    shaders: &Shaders,
+    plan: &Plan,
+    files: &[PictureFile],
+    goal: &ErrorGoal,
+    options: &RenderOptions,
+    control: &Control<'_>,
+) -> Result<Report, Diagnostic> {
+    let error = ("error", goal.error.to_string());
+    into_files(scene.render(), &plan.layers, files, options.crop, error, |emit| {
+        render_to_error(scene, shaders, plan, goal, options, control, emit)
+    })
+}
+
+/// Lets some work write its tiles of these layers into files; `fact` goes into their headers.
+fn into_files(
+    settings: &RenderSettings,
+    layers: &[Layer],
+    files: &[PictureFile],
+    crop: Option<PixelRect>,
+    fact: (&str, String),
+    work: impl FnOnce(Emit<'_>) -> Result<Report, Diagnostic>,
+) -> Result<Report, Diagnostic> {
+    let start = Instant::now();
     let picture = PixelRect::of_size(settings.size);
-    let crop = options.crop.map_or(picture, |crop| crop.intersection(&picture));
-    let outputs =
-        files.iter().map(|file| Part::open(settings, &plan.layers, file, crop)).collect::<Result<Vec<_>, _>>()?;
+    let crop = crop.map_or(picture, |crop| crop.intersection(&picture));
+    let open = |file| Part::open(settings, layers, file, crop, &fact);
+    let outputs = files.iter().map(open).collect::<Result<Vec<_>, _>>()?;
     let begun = AtomicBool::new(false);
-    let mut report = render(scene, shaders, plan, options, control, &|tile| {
+    let mut report = work(&|tile| {
         begun.store(true, Ordering::Relaxed);
         outputs.iter().try_for_each(|part| part.output.write(&part.of(tile.rect, &tile.channels)))
     })?;
@@ -79,7 +114,7 @@ pub fn write_picture(
     channels: &[Vec<f32>],
 ) -> Result<(), Diagnostic> {
     let whole = PixelRect::of_size(settings.size);
-    let part = Part::open(settings, layers, file, whole)?;
+    let part = Part::open(settings, layers, file, whole, &("samples", settings.samples.to_string()))?;
     part.output.write(&part.of(whole, channels))?;
     part.output.finish()
 }
@@ -96,6 +131,7 @@ impl Part {
         layers: &[Layer],
         file: &PictureFile,
         crop: PixelRect,
+        (name, value): &(&str, String),
     ) -> Result<Self, Diagnostic> {
         let mut channels = Vec::new();
         for layer in &file.layers {
@@ -112,10 +148,7 @@ impl Part {
             layers: file.layers.clone(),
             png_layer: file.layers.first().cloned().unwrap_or(Layer::Rgba),
             transparent: settings.background == Background::Transparent,
-            metadata: vec![
-                ("samples".into(), settings.samples.to_string()),
-                ("seed".into(), settings.seed.to_string()),
-            ],
+            metadata: vec![((*name).to_owned(), value.clone()), ("seed".to_owned(), settings.seed.to_string())],
         })?;
         Ok(Self { output, channels })
     }

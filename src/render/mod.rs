@@ -7,20 +7,25 @@
 
 mod files;
 mod grid;
+mod mask;
+pub mod refine;
 pub mod request;
 mod scripts;
 pub mod stats;
+pub mod timed;
 mod totals;
 pub mod why;
 
 pub(crate) use grid::Grid;
+pub(crate) use mask::Mask;
 pub(crate) use scripts::ScriptedLines;
 pub(crate) use totals::Totals;
 
-pub use files::{PictureFile, layers_of, render_files, write_picture};
+pub use files::{PictureFile, layers_of, render_files, render_files_to_error, write_picture};
+pub use refine::{ErrorGoal, render_to_error};
 pub use request::{LoadedScene, SceneRequest};
 
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
@@ -97,25 +102,78 @@ pub fn render(
     control: &Control<'_>,
     emit: Emit<'_>,
 ) -> Result<Report, Diagnostic> {
+    on_threads(options.threads, || {
+        let start = Instant::now();
+        let stage = Stage::new(scene, plan);
+        let mut totals = Totals::new(scene.materials().len());
+        let mut errors = ShadeErrors::default();
+        let pass = Pass { scene, shaders, plan, options, control, mask: None };
+        let complete = stage.render(&pass, &mut totals, &mut errors, emit)?;
+        totals.seconds.build = stage.build_seconds;
+        let mut report = totals.report(scene, shaders, plan, errors, complete);
+        report.stats.seconds.total = start.elapsed().as_secs_f64();
+        Ok(report)
+    })
+}
+
+/// Does some work on threads of its own; 0 for as many as the machine has.
+pub(crate) fn on_threads<T: Send>(
+    threads: usize,
+    work: impl FnOnce() -> Result<T, Diagnostic> + Send,
+) -> Result<T, Diagnostic> {
     let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(options.threads)
+        .num_threads(threads)
         .build()
         .map_err(|error| Diagnostic::error(format!("cannot start rendering threads: {error}")))?;
-    pool.install(|| {
-        let start = Instant::now();
+    pool.install(work)
+}
+
+/// What passes over a scene share: none of it depends on the number of samples.
+pub(crate) struct Stage {
+    world: World,
+    lighting: Lighting,
+    /// CPU seconds that it took to make.
+    pub build_seconds: f64,
+}
+
+/// One pass over a scene: all of a picture, or some of its blocks.
+pub(crate) struct Pass<'a> {
+    pub scene: &'a Scene,
+    pub shaders: &'a Shaders,
+    pub plan: &'a Plan,
+    pub options: &'a RenderOptions,
+    pub control: &'a Control<'a>,
+    /// The blocks to render, within the crop; `None` for all of it.
+    pub mask: Option<&'a Mask>,
+}
+
+impl Stage {
+    pub fn new(scene: &Scene, plan: &Plan) -> Self {
         let building = CpuClock::process();
         let transmissive: Vec<bool> = plan.materials.iter().map(|material| material.refracts).collect();
         let world = World::new(scene, &transmissive);
         let lighting = Lighting::new(scene, world.origin);
-        let build = building.seconds();
-        let tracer = TileTracer::new(scene, plan, &world, &lighting);
-        let mut render = Render::new(scene, shaders, plan, options, control, tracer, world.origin);
+        Self { world, lighting, build_seconds: building.seconds() }
+    }
+
+    /// Renders a pass of the scene that this was made for, or of the same scene with another number of samples; what it
+    /// costs and what fails is added. Returns whether it was not stopped. To be called on the threads that do the work.
+    pub fn render(
+        &self,
+        pass: &Pass<'_>,
+        totals: &mut Totals,
+        errors: &mut ShadeErrors,
+        emit: Emit<'_>,
+    ) -> Result<bool, Diagnostic> {
+        let tracer = TileTracer::new(pass.scene, pass.plan, &self.world, &self.lighting);
+        let mut render = Render::new(pass, tracer, self.world.origin, totals);
         render.run(emit)?;
-        let mut report = render.report();
-        report.stats.seconds.build = build;
-        report.stats.seconds.total = start.elapsed().as_secs_f64();
-        Ok(report)
-    })
+        render.totals.busy_seconds += render.busy_nanoseconds.into_inner() as f64 * 1e-9;
+        for context in render.contexts.into_inner().unwrap_or_else(PoisonError::into_inner) {
+            errors.merge(context.errors);
+        }
+        Ok(render.complete)
+    }
 }
 
 /// The largest side of a tile, for a number of samples per pixel: a tile holds at most 2²² samples, some hundred
@@ -136,13 +194,16 @@ struct Render<'a> {
     origin: DVec3,
     grid: Grid,
     crop: PixelRect,
+    mask: Option<&'a Mask>,
     /// Scratch memory and script engines, one for each thread that ever needed one.
     contexts: Mutex<Vec<TraceContext<'a>>>,
     /// By tile of the grid, while something still needs it.
     samples: Vec<Option<Box<SampledTile>>>,
     lines: Vec<Option<Box<LineBuffer>>>,
     jobs_done: AtomicUsize,
-    totals: Totals,
+    /// Wall time that threads spent on jobs.
+    busy_nanoseconds: AtomicU64,
+    totals: &'a mut Totals,
     complete: bool,
 }
 
@@ -167,23 +228,30 @@ enum Job {
 
 /// What a job made.
 enum Product {
-    Sampled { tile: usize, traced: Box<TracedTile>, bounds: Option<TileBounds>, line_seconds: f64 },
-    Lined { tile: usize, lines: Box<LineBuffer>, seconds: f64 },
-    Developed { seconds: f64 },
+    Sampled {
+        tile: usize,
+        traced: Box<TracedTile>,
+        bounds: Option<TileBounds>,
+        line_seconds: f64,
+    },
+    Lined {
+        tile: usize,
+        lines: Box<LineBuffer>,
+        seconds: f64,
+    },
+    Developed {
+        seconds: f64,
+    },
+    /// Nothing of the tile was needed.
+    Nothing,
 }
 
 impl<'a> Render<'a> {
-    fn new(
-        scene: &'a Scene,
-        shaders: &'a Shaders,
-        plan: &'a Plan,
-        options: &RenderOptions,
-        control: &'a Control<'a>,
-        tracer: TileTracer<'a>,
-        origin: DVec3,
-    ) -> Self {
+    fn new(pass: &Pass<'a>, tracer: TileTracer<'a>, origin: DVec3, totals: &'a mut Totals) -> Self {
+        let Pass { scene, shaders, plan, options, control, mask } = *pass;
         let picture = PixelRect::of_size(scene.render().size);
         let crop = options.crop.map_or(picture, |crop| crop.intersection(&picture));
+        let crop = mask.map_or(crop, |mask| mask.extent().intersection(&crop));
         let border = plan.lines.as_ref().map_or(0, |lines| lines.reach) + plan.filter.reach();
         let tile = options.tile.clamp(1, largest_tile(scene.render().samples));
         let grid = Grid::new(crop.grown(border).intersection(&picture), tile);
@@ -196,11 +264,13 @@ impl<'a> Render<'a> {
             tracer,
             origin,
             crop,
+            mask,
             contexts: Mutex::default(),
             samples: (0..grid.tiles()).map(|_| None).collect(),
             lines: (0..grid.tiles()).map(|_| None).collect(),
             jobs_done: AtomicUsize::new(0),
-            totals: Totals::new(scene.materials().len()),
+            busy_nanoseconds: AtomicU64::new(0),
+            totals,
             complete: true,
             grid,
         }
@@ -253,21 +323,23 @@ impl<'a> Render<'a> {
         if self.cancelled() {
             return Ok(None);
         }
+        let begun = Instant::now();
         let clock = CpuClock::thread();
         let product = match job {
-            Job::Sample(tile) => Some(self.sample(tile)),
+            Job::Sample(tile) => self.sample(tile),
+            Job::Line(tile) if self.needed(tile, self.plan.filter.reach()).is_none() => Some(Product::Nothing),
             Job::Line(tile) => self.line(tile).map(|lines| {
                 let seconds = clock.seconds();
                 Product::Lined { tile, lines: Box::new(lines), seconds }
             }),
             Job::Develop(tile) => {
-                let film = self.develop(tile);
-                if film.rect.pixels() > 0 {
-                    emit(&film)?;
+                for rect in self.shown(tile) {
+                    emit(&self.develop(tile, rect))?;
                 }
                 Some(Product::Developed { seconds: clock.seconds() })
             }
         };
+        self.busy_nanoseconds.fetch_add(begun.elapsed().as_nanos() as u64, Ordering::Relaxed);
         let done = self.jobs_done.fetch_add(1, Ordering::Relaxed) + 1;
         if let Some(progress) = self.control.progress {
             let stages = if self.plan.lines.is_some() { 3 } else { 2 };
@@ -276,13 +348,29 @@ impl<'a> Render<'a> {
         Ok(product)
     }
 
-    fn sample(&self, tile: usize) -> Product {
+    /// The part of a tile within a margin of what is shown; `None` if there is none.
+    fn needed(&self, tile: usize, margin: i32) -> Option<PixelRect> {
+        let rect = self.grid.rect(tile);
+        self.mask.map_or(Some(rect), |mask| mask.needed(rect, margin))
+    }
+
+    /// What is shown of a tile.
+    fn shown(&self, tile: usize) -> Vec<PixelRect> {
+        let rect = self.grid.rect(tile).intersection(&self.crop);
+        let mut shown = self.mask.map_or_else(|| vec![rect], |mask| mask.parts_of(rect));
+        shown.retain(|part| part.pixels() > 0);
+        shown
+    }
+
+    fn sample(&self, tile: usize) -> Option<Product> {
+        let reach = self.plan.lines.as_ref().map_or(0, |lines| lines.reach);
+        let Some(rect) = self.needed(tile, reach + self.plan.filter.reach()) else { return Some(Product::Nothing) };
         let mut context = self.borrow_context();
-        let traced = Box::new(self.tracer.trace(self.grid.rect(tile), &mut context));
+        let traced = Box::new(self.tracer.trace(rect, &mut context));
         self.return_context(context);
         let clock = CpuClock::thread();
         let bounds = self.plan.lines.as_ref().map(|lines| TileBounds::new(&traced.samples, &lines.rules));
-        Product::Sampled { tile, traced, bounds, line_seconds: clock.seconds() }
+        Some(Product::Sampled { tile, traced, bounds, line_seconds: clock.seconds() })
     }
 
     fn line(&self, tile: usize) -> Option<LineBuffer> {
@@ -311,7 +399,8 @@ impl<'a> Render<'a> {
         self.contexts.lock().unwrap_or_else(PoisonError::into_inner).push(context);
     }
 
-    fn develop(&self, tile: usize) -> FilmTile {
+    /// Develops a part of a tile.
+    fn develop(&self, tile: usize, rect: PixelRect) -> FilmTile {
         let part = self.grid.around(tile, self.plan.filter.reach());
         let of_tile = |tile: &usize| {
             let samples = self.samples[*tile].as_ref()?;
@@ -319,7 +408,6 @@ impl<'a> Render<'a> {
         };
         let tiles = part.tiles.iter().map(of_tile).collect();
         let window = FilmWindow { origin: part.origin, tile: self.grid.tile, columns: part.columns, tiles };
-        let rect = self.grid.rect(tile).intersection(&self.crop);
         develop(&window, rect, &self.plan.filter, &self.plan.layers)
     }
 
@@ -338,14 +426,7 @@ impl<'a> Render<'a> {
                 self.lines[tile] = Some(lines);
             }
             Product::Developed { seconds } => self.totals.seconds.film += seconds,
+            Product::Nothing => {}
         }
-    }
-
-    fn report(self) -> Report {
-        let mut errors = ShadeErrors::default();
-        for context in self.contexts.into_inner().unwrap_or_else(PoisonError::into_inner) {
-            errors.merge(context.errors);
-        }
-        self.totals.report(self.scene, self.shaders, self.plan, errors, self.complete)
     }
 }

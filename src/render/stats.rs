@@ -2,6 +2,8 @@
 
 use serde::Serialize;
 
+use super::refine::Refinement;
+use super::timed::Choice;
 use crate::line::LineCounts;
 use crate::sample::GateCounts;
 use crate::trace::RayCounts;
@@ -31,6 +33,19 @@ pub struct Stats {
     pub shaders: Vec<ShaderStats>,
     /// The plan, as `tusche explain` prints it.
     pub plan: String,
+    /// How the samples were chosen, where it was not the scene or `--samples` that did.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sampling: Option<Sampling>,
+}
+
+/// How the samples were chosen.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Sampling {
+    /// By `--time`.
+    Time(Choice),
+    /// By `--error`.
+    Error(Refinement),
 }
 
 /// `total` is wall time; the others are CPU seconds summed over threads. Those of `load` and `build` count all that the
@@ -133,4 +148,28 @@ pub fn peak_memory() -> Option<u64> {
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
     let kibibytes: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
     Some(kibibytes * 1024)
+}
+
+/// Makes [`peak_memory`] begin anew, at what the process holds now; whether the system can do that (Linux can).
+#[must_use]
+pub fn reset_peak_memory() -> bool {
+    std::fs::write("/proc/self/clear_refs", "5").is_ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_peak_is_forgotten_once_it_is_reset() {
+        const MANY: usize = 256 << 20;
+        let filled = std::hint::black_box(vec![1_u8; MANY]);
+        let Some(with) = peak_memory() else { return };
+        drop(filled);
+        assert!(peak_memory() >= Some(with), "a peak stays");
+        if reset_peak_memory() {
+            // Other tests of the process take memory meanwhile, but not that much.
+            assert!(peak_memory().is_some_and(|now| now < with - MANY as u64 / 2));
+        }
+    }
 }

@@ -19,9 +19,11 @@ pub(crate) struct Totals {
     /// Hits shaded, by material.
     pub hits: Vec<u64>,
     pub shade_seconds: Vec<f64>,
+    /// Wall time that threads spent on jobs: more than CPU time where they had to wait for a CPU.
+    pub busy_seconds: f64,
     lines: LineCounts,
     surfaces_behind: u64,
-    samples: u64,
+    pub samples: u64,
     bytes: u64,
     /// By material, misses first.
     gate: Vec<GateCounts>,
@@ -34,6 +36,7 @@ impl Totals {
             rays: RayCounts::default(),
             hits: vec![0; materials],
             shade_seconds: vec![0.0; materials],
+            busy_seconds: 0.0,
             lines: LineCounts::default(),
             surfaces_behind: 0,
             samples: 0,
@@ -96,6 +99,7 @@ impl Totals {
                 triangles: scene.triangle_count(),
                 shaders: of_shaders,
                 plan: plan.to_string(),
+                sampling: None,
             },
             script_errors: errors.into_diagnostics(),
             warnings: gate_warnings(scene, shaders, &self.gate),

@@ -70,6 +70,9 @@ pub struct Scene {
 }
 
 impl Scene {
+    /// The most samples a pixel can have.
+    pub const MAX_SAMPLES: u32 = check::MAX_SAMPLES;
+
     /// `[render]`.
     #[must_use]
     pub fn render(&self) -> &RenderSettings {
@@ -168,6 +171,14 @@ impl Scene {
     #[must_use]
     pub fn triangle_count(&self) -> usize {
         self.parts.meshes.iter().map(|mesh| mesh.triangles.len()).sum()
+    }
+
+    /// The same scene with another number of samples per pixel, 1 … [`Self::MAX_SAMPLES`].
+    #[must_use]
+    pub fn with_samples(&self, samples: u32) -> Self {
+        let mut scene = self.clone();
+        scene.parts.render.samples = samples.clamp(1, Self::MAX_SAMPLES);
+        scene
     }
 
     /// The parts again, to build a changed scene from.

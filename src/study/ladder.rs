@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use super::quality::Quality;
 use crate::film::Layer;
 use crate::line::Method;
 use crate::plan::{Plan, bounds, drawing_materials, filter_name};
@@ -186,6 +187,8 @@ pub struct Ladder {
     pub knobs: Vec<Rungs>,
     /// The knobs that do not, and why.
     pub left_out: Vec<(Knob, &'static str)>,
+    /// The places of the presets in [`Ladder::points`]; empty unless the ladder of samples is tried.
+    pub presets: Vec<(Quality, usize)>,
     /// The settings of the reference, but for its samples.
     pub ideal: Settings,
 }
@@ -202,7 +205,8 @@ impl Ladder {
         let plan = Plan::new(scene, shaders, &[Layer::Rgba]);
         let own = Settings::of(scene);
         let ideal = ideal(scene, shaders, &plan, &own);
-        let mut ladder = Self { points: vec![own], knobs: Vec::new(), left_out: Vec::new(), ideal };
+        let mut ladder =
+            Self { points: vec![own], knobs: Vec::new(), left_out: Vec::new(), presets: Vec::new(), ideal };
         for knob in Knob::ALL.into_iter().filter(|knob| wanted.contains(knob)) {
             match rungs(knob, scene, shaders, &plan, &own, &ideal) {
                 Ok(settings) => {
@@ -211,6 +215,9 @@ impl Ladder {
                 }
                 Err(why) => ladder.left_out.push((knob, why)),
             }
+        }
+        if wanted.contains(&Knob::Samples) {
+            ladder.presets = Quality::ALL.map(|quality| (quality, ladder.point(quality.settings(&own)))).to_vec();
         }
         ladder
     }
@@ -240,18 +247,25 @@ impl Ladder {
                 }
             }
         }
+        for (_, point) in &self.presets {
+            if !order.contains(point) {
+                order.push(*point);
+            }
+        }
         order
     }
 
-    /// What a point is called: the first knob that it is on, and its value there.
+    /// What a point is called: the first knob that it is on, and its value there, or a preset.
     #[must_use]
     pub fn name(&self, point: usize) -> String {
         if point == 0 {
             return "the scene".to_owned();
         }
-        let rungs = self.knobs.iter().find(|rungs| rungs.points.contains(&point));
-        rungs
-            .map_or_else(String::new, |rungs| format!("{} {}", rungs.knob.name(), self.points[point].value(rungs.knob)))
+        if let Some(rungs) = self.knobs.iter().find(|rungs| rungs.points.contains(&point)) {
+            return format!("{} {}", rungs.knob.name(), self.points[point].value(rungs.knob));
+        }
+        let preset = self.presets.iter().find(|(_, place)| *place == point);
+        preset.map_or_else(String::new, |(quality, _)| format!("quality {}", quality.name()))
     }
 }
 

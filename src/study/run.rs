@@ -18,7 +18,7 @@ use super::width::{self, Drawn};
 use crate::diag::{Diagnostic, Diagnostics, Span};
 use crate::film::{FilmTile, Layer, LinePath};
 use crate::plan::Plan;
-use crate::render::stats::Stats;
+use crate::render::stats::{Stats, reset_peak_memory};
 use crate::render::{Control, RenderOptions, render};
 use crate::scene::{Scene, SceneBuilder};
 use crate::shade::Shaders;
@@ -411,7 +411,10 @@ impl Camera<'_> {
         };
         let options = RenderOptions { threads: self.threads, method: settings.method, ..RenderOptions::default() };
         let control = Control { cancel: self.cancel, progress: None };
-        let report = render(&scene, self.shaders, &plan, &options, &control, &emit)?;
+        // The process is the same for all pictures; what it always holds (the scene, the reference) is in every peak.
+        let reset = reset_peak_memory();
+        let mut report = render(&scene, self.shaders, &plan, &options, &control, &emit)?;
+        report.stats.peak_rss_bytes = report.stats.peak_rss_bytes.filter(|_| reset);
         if report.script_errors.has_errors() {
             return Err(report.script_errors);
         }

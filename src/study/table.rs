@@ -43,6 +43,8 @@ pub struct Run {
     pub shade_seconds: f64,
     pub lines_seconds: f64,
     pub film_seconds: f64,
+    /// Most memory that the process held meanwhile, where the system can tell.
+    pub peak_rss_bytes: Option<u64>,
     pub bytes_per_sample: f64,
     pub rmse: f64,
     pub rmse_lines: Option<f64>,
@@ -82,6 +84,7 @@ impl Run {
             shade_seconds: seconds.shade,
             lines_seconds: seconds.lines,
             film_seconds: seconds.film,
+            peak_rss_bytes: stats.peak_rss_bytes,
             bytes_per_sample: stats.bytes_per_sample,
             rmse: errors.rmse.all,
             rmse_lines: errors.rmse.lines,

@@ -43,11 +43,11 @@ fn read(place: &Workplace, name: &str) -> String {
     fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
 
-/// Rows of the table without what a clock says.
+/// Rows of the table without what a clock and the system's memory say.
 fn rows(table: &str) -> Vec<String> {
     let without_times = |line: &str| {
         let cells: Vec<_> = line.split(',').collect();
-        [&cells[..13], &cells[20..]].concat().join(",")
+        [&cells[..13], &cells[21..]].concat().join(",")
     };
     let mut rows: Vec<_> = table.lines().skip(1).map(without_times).collect();
     rows.sort();
@@ -71,7 +71,7 @@ fn a_study_writes_a_table_numbers_pictures_and_a_page() {
         Some(
             "scene,reference,samples,sampler,method,min_width,width_compensation,surfaces,reflection_depth,refraction_depth,filter,\
              filter_radius,repeat,threads,wall_seconds,build_seconds,trace_seconds,shade_seconds,lines_seconds,film_seconds,\
-             bytes_per_sample,rmse,rmse_lines,rmse_reflections,rmse_rest,flip,flip_lines,flip_reflections,flip_rest,\
+             peak_rss_bytes,bytes_per_sample,rmse,rmse_lines,rmse_reflections,rmse_rest,flip,flip_lines,flip_reflections,flip_rest,\
              line_coverage,line_position"
         )
     );
@@ -80,7 +80,7 @@ fn a_study_writes_a_table_numbers_pictures_and_a_page() {
 
     let found = numbers(&place.folder.path().join("out"));
     let keys: Vec<_> = found.as_object().map(|map| map.keys().map(String::as_str).collect()).unwrap_or_default();
-    let expected = "scene size version threads complete left_out_for_time reference knobs knobs_that_do_not_matter points fits fronts drawn_widths";
+    let expected = "scene size version threads complete left_out_for_time reference knobs knobs_that_do_not_matter points fits fronts presets drawn_widths";
     assert_eq!(keys.join(" "), expected);
     assert_eq!((&found["complete"], &found["left_out_for_time"]), (&Value::Bool(true), &Value::from(0)));
     let points = found["points"].as_array().expect("there are points");
@@ -96,6 +96,17 @@ fn a_study_writes_a_table_numbers_pictures_and_a_page() {
         point["errors"]["line_coverage"]["mean"].as_f64().expect("there are lines")
     };
     assert!(coverage(144) < 0.3 * coverage(4), "{} {}", coverage(144), coverage(4));
+    let presets = found["presets"].as_array().expect("there are presets");
+    let names: Vec<_> = presets.iter().map(|preset| preset["name"].as_str().unwrap_or_default()).collect();
+    assert_eq!(names, ["draft", "preview", "final"]);
+    for (preset, samples) in presets.iter().zip([4, 16, 64]) {
+        let point = points.iter().find(|point| point["point"] == preset["point"]).expect("the point was measured");
+        assert!(point["settings"]["samples"] == samples && preset["behind_front"]["flip"].is_number(), "{preset}");
+    }
+    if cfg!(target_os = "linux") {
+        assert!(points.iter().all(|point| point["peak_rss_bytes"].as_f64().is_some_and(|peak| peak > 1e6)));
+        assert!(read(&place, "out/index.html").contains("Most memory that the process held"));
+    }
     let fit = &found["fits"][0];
     assert_eq!((&fit["knob"], &fit["error"]), (&"samples".into(), &"line_coverage".into()));
     let slope = fit["exponent"]["by_samples"].as_f64().expect("a slope is fitted");

@@ -52,6 +52,13 @@ pub fn json(study: &Study, summary: &Summary) -> Value {
         let front: Vec<usize> = summary.front(measure).iter().map(|point| point.index).collect();
         (measure.name.to_owned(), json!(front))
     });
+    let presets = study.ladder.presets.iter().map(|(quality, point)| {
+        let behind = MEASURES.iter().filter_map(|measure| {
+            let behind = summary.behind_front(*point, measure);
+            behind.is_finite().then(|| (measure.name.to_owned(), json!(behind)))
+        });
+        json!({ "name": quality.name(), "point": point, "behind_front": behind.collect::<Map<_, _>>() })
+    });
     let threads = study.runs.iter().flatten().next().map(|run| run.threads);
     json!({
         "scene": study.title,
@@ -71,6 +78,7 @@ pub fn json(study: &Study, summary: &Summary) -> Value {
         "points": summary.points.iter().map(point).collect::<Vec<_>>(),
         "fits": fits.chain(of_samplers).collect::<Vec<_>>(),
         "fronts": fronts.collect::<Map<_, _>>(),
+        "presets": presets.collect::<Vec<_>>(),
         "drawn_widths": study.widths,
     })
 }
@@ -87,6 +95,7 @@ fn point(point: &Point) -> Value {
         "cpu_seconds": point.cpu,
         "cpu_seconds_by_stage": stages,
         "bytes_per_sample": point.bytes_per_sample,
+        "peak_rss_bytes": point.peak,
         "errors": errors(&point.errors),
     })
 }

@@ -28,6 +28,7 @@ pub(super) fn page(study: &Study, summary: &Summary, folder: &Folder) -> String 
         plots(study, summary),
         samplers(study, summary),
         widths::section(&study.widths),
+        presets(study, summary),
         costs(study, summary),
         pictures(study, summary, folder),
         tables(study, summary),
@@ -183,6 +184,31 @@ fn plot<'a>(study: &Study, summary: &Summary, measure: &'a Measure, fit: Option<
     }
 }
 
+/// Where the presets of `--quality` lie.
+fn presets(study: &Study, summary: &Summary) -> String {
+    let known = |index: usize| summary.points.iter().find(|point| point.index == index);
+    let rows = study.ladder.presets.iter().filter_map(|(quality, index)| {
+        let point = known(*index)?;
+        let mut cells = vec![quality.name().to_owned(), point.settings.samples.to_string(), number(point.cpu.median)];
+        cells.extend(MEASURES.iter().map(|measure| {
+            let behind = summary.behind_front(*index, measure);
+            let error = point.error(measure.of).map_or_else(|| "–".to_owned(), |error| number(error.mean));
+            format!("{error} <span class=\"soft\">({behind:.2})</span>")
+        }));
+        Some(format!("<tr><td>{}</td></tr>", cells.join("</td><td>")))
+    });
+    let rows: Vec<_> = rows.collect();
+    if rows.is_empty() {
+        return String::new();
+    }
+    format!(
+        "<h2>Presets</h2>\n<p>What <i>--quality</i> chooses. In brackets: by which factor another point is both faster and nearer to the \
+         reference; up to 1 lies on the front.</p>\n<div class=\"wide\"><table>\n<thead><tr><th>preset</th><th>samples</th><th>CPU, s</th>\
+         <th>coverage</th><th>position, px</th><th>FLIP</th><th>RMSE</th></tr></thead>\n<tbody>\n{}\n</tbody></table></div>\n",
+        rows.join("\n")
+    )
+}
+
 /// Errors of each sampler against samples.
 fn samplers(study: &Study, summary: &Summary) -> String {
     let points = summary.of_knob(study, Knob::Sampler);
@@ -281,6 +307,20 @@ fn costs(study: &Study, summary: &Summary) -> String {
              {caption}</figcaption></figure>"
         );
     }
+    let peaks = |points: &[&Point]| {
+        let of = |point: &&Point| Some((point.name.clone(), vec![0.0, 0.0, point.peak? / f64::from(1 << 20)]));
+        points.iter().filter_map(of).collect::<Vec<_>>()
+    };
+    for (points, caption) in [(&samples, "by samples"), (&others, "by everything else")] {
+        let peaks = peaks(points);
+        if !peaks.is_empty() {
+            let plot = bars("peak memory", &peaks, "MiB");
+            let _ = writeln!(
+                html,
+                "<figure>{plot}<figcaption>Most memory that the process held, scene and reference included, {caption}</figcaption></figure>"
+            );
+        }
+    }
     html + "</div>\n"
 }
 
@@ -353,7 +393,7 @@ fn tables(study: &Study, summary: &Summary) -> String {
     let mut html = "<h2>All numbers</h2>\n<p>Seconds are medians, with least and greatest; errors are means, with the standard deviation \
                     over seeds. Coverage: which share of the lines' area is wrong. Position: how far lines are from their places, in \
                     pixels.</p>\n<div class=\"wide\"><table>\n<thead><tr><th>setting</th><th>runs</th><th>wall, s</th><th>CPU, s</th>\
-                    <th>bytes/sample</th><th>coverage</th><th>position, px</th><th>FLIP</th><th>RMSE</th></tr></thead>\n<tbody>\n"
+                    <th>bytes/sample</th><th>peak, MiB</th><th>coverage</th><th>position, px</th><th>FLIP</th><th>RMSE</th></tr></thead>\n<tbody>\n"
         .to_owned();
     rows(&mut html, study, summary, |point| {
         let spread = |spread: Spread| {
@@ -362,6 +402,7 @@ fn tables(study: &Study, summary: &Summary) -> String {
         };
         let mut cells =
             vec![point.runs.to_string(), spread(point.wall), spread(point.cpu), number(point.bytes_per_sample)];
+        cells.push(point.peak.map_or_else(|| "–".to_owned(), |peak| number(peak / f64::from(1 << 20))));
         cells.extend(MEASURES.iter().map(|measure| cell(point.error(measure.of))));
         cells
     });
@@ -396,7 +437,7 @@ fn cell(mean: Option<Mean>) -> String {
 
 fn rows(html: &mut String, study: &Study, summary: &Summary, cells: impl Fn(&Point) -> Vec<String>) {
     for rungs in &study.ladder.knobs {
-        let _ = writeln!(html, "<tr class=\"group\"><td colspan=\"9\">{}</td></tr>", rungs.knob.name());
+        let _ = writeln!(html, "<tr class=\"group\"><td colspan=\"10\">{}</td></tr>", rungs.knob.name());
         for point in summary.of_knob(study, rungs.knob) {
             let class = if point.index == 0 { " class=\"own\"" } else { "" };
             let cells: String = cells(point).iter().map(|cell| format!("<td>{cell}</td>")).collect();

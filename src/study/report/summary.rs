@@ -99,6 +99,8 @@ pub struct Point {
     pub stages: [f64; 5],
     /// Bytes per sample.
     pub bytes_per_sample: f64,
+    /// Most memory that the process held, in bytes, where the system can tell.
+    pub peak: Option<f64>,
     /// The errors of every run.
     pub errors: Vec<Errors>,
 }
@@ -126,6 +128,8 @@ impl Point {
             cpu: all(Run::cpu_seconds),
             stages: stages.map(|stage| all(stage).median),
             bytes_per_sample: all(|run| run.bytes_per_sample).median,
+            peak: Some(Spread::of(runs.iter().filter_map(|run| Some(run.peak_rss_bytes? as f64)).collect()).median)
+                .filter(|peak| *peak > 0.0),
             errors: runs.iter().map(Run::errors).collect(),
         })
     }
@@ -190,6 +194,17 @@ impl Summary {
         let points = self.of_knob(study, Knob::Sampler);
         let of = |sampler| points.iter().copied().filter(|point| point.settings.sampler == sampler).collect::<Vec<_>>();
         Sampler::ALL.into_iter().map(|sampler| (sampler, fitted(&of(sampler), study, measure))).collect()
+    }
+
+    /// How far a point lies behind the front: the largest factor by which another point is both faster and nearer to the
+    /// reference. At most 1 if it is on the front; infinite if it was not measured.
+    #[must_use]
+    pub fn behind_front(&self, index: usize, measure: &Measure) -> f64 {
+        let figures = |point: &Point| Some([point.cpu.median, point.error(measure.of)?.mean]);
+        let own = self.points.iter().find(|point| point.index == index).and_then(figures);
+        let Some([seconds, error]) = own else { return f64::INFINITY };
+        let others = self.points.iter().filter(|point| point.index != index).filter_map(figures);
+        others.map(|other| (seconds / other[0]).min(error / other[1])).fold(0.0, f64::max)
     }
 
     /// The points that no other beats in both time and error, by rising time.
