@@ -193,7 +193,7 @@ fn rays() {
          {knot}translate = [0, 0.9, -1.2]\nrotate = [80, 10, 30]\nscale = 1.3\n"
     ));
     // World space in double precision, relative to the camera, as in the renderer.
-    let eye = scene.camera().world_from_camera.translation;
+    let eye = scene.camera().position;
     let (mut triangles, mut owners) = (Vec::new(), Vec::new());
     for (owner, object) in scene.objects().iter().enumerate() {
         let mesh = &scene.meshes()[object.mesh.index()];
