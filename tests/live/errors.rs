@@ -29,7 +29,7 @@ fn a_broken_scene_is_told_once() {
     let place = place();
     let watching = Watching::start(options(&place));
     watching.picture();
-    place.file("scene.toml", SCENE.replace("samples = 2", "sample = 2"));
+    place.file("scene.toml", SCENE.replace("samples = 2", "smaples = 2"));
     assert!(watching.faults().contains("samples"));
     // The same mistake, and something else that does not matter.
     place.file("ink.rhai", INK.replace("2.0", "3.0"));
