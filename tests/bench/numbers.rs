@@ -57,10 +57,12 @@ fn load(text: &str) -> Scene {
 
 // Rays.
 
+/// A box, and the first triangle of a leaf with one past its last, or the second child of a node whose first child follows it.
+type Node<T> = ([[T; 3]; 2], Result<[u32; 2], u32>);
+
 /// A hierarchy of boxes over triangles, halved at the median of the longest side, four triangles a leaf.
 struct Tree {
-    /// First and last triangle of a leaf, or the second child of a node whose first child follows it.
-    nodes: Vec<([[f64; 3]; 2], Result<[u32; 2], u32>)>,
+    nodes: Vec<Node<f64>>,
     order: Vec<u32>,
 }
 
@@ -103,7 +105,7 @@ macro_rules! walk {
             type V = [F; 3];
 
             pub struct Walk {
-                nodes: Vec<([V; 2], Result<[u32; 2], u32>)>,
+                nodes: Vec<super::Node<F>>,
                 triangles: Vec<([V; 3], u32)>,
             }
 
