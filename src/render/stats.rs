@@ -166,7 +166,8 @@ mod tests {
         let filled = std::hint::black_box(vec![1_u8; MANY]);
         let Some(with) = peak_memory() else { return };
         drop(filled);
-        assert!(peak_memory() >= Some(with), "a peak stays");
+        // The system counts pages by thread, and adds the counts up now and then.
+        assert!(peak_memory().is_some_and(|still| still + (16 << 20) >= with), "a peak stays");
         if reset_peak_memory() {
             // Other tests of the process take memory meanwhile, but not that much.
             assert!(peak_memory().is_some_and(|now| now < with - MANY as u64 / 2));

@@ -31,8 +31,10 @@ const BLOCK: u32 = 16;
 const LEAST_BLOCKS: usize = 48;
 /// The part of the time left that a pilot may take.
 const PILOT_SHARE: f64 = 0.1;
+/// How many times as many samples as the one before a pilot has, at most: how costs grow has to be seen before it is relied on.
+const GROWTH: u32 = 8;
 /// Most pilots.
-const MOST_PILOTS: usize = 4;
+const MOST_PILOTS: usize = 6;
 
 /// How many samples were chosen, and why.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -101,7 +103,9 @@ impl Chooser {
         }
         // Pilots of more samples take time, too.
         let per_sample = last.took / f64::from(last.samples);
-        let pilot = self.fitting(left * (1.0 - PILOT_SHARE)).min((left * PILOT_SHARE / per_sample.max(1e-9)) as u32);
+        let affordable = (left * PILOT_SHARE / per_sample.max(1e-9)) as u32;
+        let grown = last.samples.saturating_mul(GROWTH);
+        let pilot = self.fitting(left * (1.0 - PILOT_SHARE)).min(affordable).min(grown);
         if self.measured.len() < MOST_PILOTS && pilot >= last.samples.saturating_mul(2) {
             return Step::Measure(pilot);
         }
@@ -128,7 +132,7 @@ impl Chooser {
         let Some(last) = self.measured.last() else { return 0.0 };
         let mean = last.whole / f64::from(last.samples);
         let Some(before) = self.measured.iter().rev().find(|known| known.samples < last.samples) else { return mean };
-        ((last.whole - before.whole) / f64::from(last.samples - before.samples)).clamp(0.6 * mean, 1.1 * mean)
+        ((last.whole - before.whole) / f64::from(last.samples - before.samples)).clamp(0.6 * mean, 1.25 * mean)
     }
 }
 
@@ -293,11 +297,12 @@ mod tests {
         let blocks = |size: [u32; 2]| lattice(size, PixelRect::of_size(size)).blocks().count();
         assert_eq!((blocks([1280, 720]), blocks([320, 180]), blocks([40, 30])), (144, 48, 6));
         let mask = lattice([1280, 720], PixelRect::of_size([1280, 720]));
-        for row in 0..9 {
-            // Each square of 5 × 5 blocks has one.
-            for column in 0..16 {
-                let square = PixelRect { x0: column * 80, y0: row * 80, x1: column * 80 + 80, y1: row * 80 + 80 };
-                assert_eq!(mask.parts_of(square).len(), 1);
+        for row in 0..4 {
+            // Each square of 10 × 10 blocks has about four.
+            for column in 0..8 {
+                let square = PixelRect { x0: column * 160, y0: row * 160, x1: column * 160 + 160, y1: row * 160 + 160 };
+                let count = mask.parts_of(square).len();
+                assert!((3..=5).contains(&count), "{count} at {column}, {row}");
             }
         }
     }

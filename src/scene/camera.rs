@@ -177,8 +177,8 @@ impl CameraRays {
         let along = |axis: usize| {
             let (mx, my, mz) = (x_axis[axis], y_axis[axis], z_axis[axis] * -1.0);
             let mut along = [0.0; N];
-            for lane in 0..N {
-                along[lane] = mx * x[lane] + my * y[lane] + mz;
+            for (along, (x, y)) in along.iter_mut().zip(x.iter().zip(&y)) {
+                *along = mx * x + my * y + mz;
             }
             along
         };

@@ -3,7 +3,7 @@
 //! - [`triangle`]: the watertight ray–triangle test.
 //! - [`tree`]: bounding volume hierarchies and the traversal they share; [`mesh_tree`]: one over the triangles of a mesh.
 //! - [`world`]: one hierarchy over the objects; closest hits and shadow rays. `hits` settles which hit of a ray comes first.
-- [`packet`], [`world_packet`]: the same for sixteen rays that go much the same way.
+//! - [`packet`], [`world_packet`]: the same for sixteen rays that go much the same way.
 //! - [`surface`]: from a hit to a place with normals, texture coordinates and error bounds.
 //! - [`wave`]: the rays of a tile, one depth of the ray tree at a time; `shadow` finds what lights give a hit, `scatter`
 //!   shades hits and sends rays on; `media` knows which bodies of glass a ray is in; `list` keeps what the line pass wants to

@@ -157,13 +157,13 @@ impl BsdfLanes {
             let ggx = distribution * 0.5 / (shadowing + masking);
 
             let is_mirror = roughness[i] <= MIRROR_ROUGHNESS;
-            let faces = !(cos_light <= 0.0);
+            let is_behind = cos_light <= 0.0;
             let of_channel = |base: f32, irradiance: f32, sum: f32| {
                 let metal = base + (1.0 - base) * fresnel;
                 let reflectance = dielectric * (1.0 - metallic[i]) + metal * metallic[i];
                 let specular = if is_mirror { 0.0 } else { reflectance * ggx };
                 let scattered = (base * lambert * diffuse + specular) * irradiance * cos_light;
-                let scattered = if faces { scattered } else { 0.0 };
+                let scattered = if is_behind { 0.0 } else { scattered };
                 if light.seen[i] { sum + scattered } else { sum }
             };
             red[i] = of_channel(base_color[0][i], light.irradiance[0][i], red[i]);
