@@ -167,11 +167,14 @@ mod tests {
     #[test]
     fn a_ring_has_the_area_of_a_ring_through_any_filter() {
         for filter in filters() {
+            // Only of these do the weights of all pixels add up to the same everywhere.
+            let is_even = matches!(filter.kind(), FilterKind::Box | FilterKind::Tent);
+            let tolerance = if is_even { 2e-4 } else { 5e-3 };
             for (radius, width) in [(9.0, 0.5), (9.0, 3.0), (2.0, 8.0)] {
                 let area: f64 = covered(vec![ring(radius, width)], &filter).iter().sum();
                 let [outer, inner] = [radius + width / 2.0, f64::max(radius - width / 2.0, 0.0)];
                 let truth = PI * (outer * outer - inner * inner);
-                assert!((area / truth - 1.0).abs() < 2e-4, "{filter:?}: {area} for {truth}");
+                assert!((area / truth - 1.0).abs() < tolerance, "{:?}: {area} for {truth}", filter.kind());
             }
         }
     }

@@ -2,7 +2,7 @@
 //!
 //! Every position is a function of the seed, the pixel and the number of the sample, so tiles, crops and threads cannot matter.
 //! There are three samplers ([`Sampler`]); what each buys is measured in the README, chapter "What accuracy costs". Both that are not
-//! `stratified` are made for powers of two: of other counts they take the first of the next larger power's points.
+//! `stratified` are at their best for powers of two.
 
 mod sobol;
 mod stratified;
@@ -159,6 +159,10 @@ mod tests {
             assert_ne!(offset(0, [3, 4]), offset(1, [3, 4]));
             assert_ne!(offset(0, [3, 4]), offset(1 << 32, [3, 4]));
             assert_ne!(offset(0, [3, 4]), offset(0, [4, 3]));
+            // Of blue noise, the number of a sample tells the column that it lies in; see the next test for all of them.
+            if sampler == Sampler::BlueNoise {
+                continue;
+            }
             let mean: f32 = (0..1000).map(|x| offset(0, [x, 0])[0]).sum::<f32>() / 1000.0;
             // Sample 5 of jittered 4×4 lies in the second column: 0.25 … 0.5, deviation of the mean 0.0023; elsewhere
             // it is anywhere, deviation 0.009.

@@ -33,19 +33,22 @@ impl Sobol {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct BlueNoise {
     seed: u32,
-    /// log₂ of the points of a block.
-    bits: u32,
+    /// Points of a block.
+    samples: u32,
+    /// How many levels of squares of pixels the sequence has room for.
+    digits: u32,
 }
 
 impl BlueNoise {
     pub(super) fn new(samples: u32, seed: u32) -> Self {
-        Self { seed, bits: samples.max(1).next_power_of_two().trailing_zeros().min(30) }
+        let bits = samples.max(1).next_power_of_two().trailing_zeros().min(30);
+        Self { seed, samples, digits: (32 - bits) / 2 }
     }
 
     pub(super) fn of_pixel(&self, [x, y]: [i32; 2]) -> OfPixel {
         let place = interleaved(x as u32) | interleaved(y as u32) << 1;
-        // As many pixels as the sequence has room for; the next square of as many has a scrambling of its own.
-        let digits = (32 - self.bits) / 2;
+        // The next square of as many pixels has a scrambling of its own.
+        let digits = self.digits;
         let square = place >> (2 * digits);
         let key = mix(square as u32, (square >> 32) as u32, self.seed);
         // Which of its four parts a square visits when is shuffled, at every level: else the curve would show.
@@ -55,7 +58,8 @@ impl BlueNoise {
             let part = (place >> (2 * level)) as u32 & 3;
             block = block << 2 | shuffled(part, mix(above, level, key));
         }
-        OfPixel::new(block << self.bits, key)
+        // Blocks leave no point out: which those are would be the same in all pixels.
+        OfPixel::new(block.wrapping_mul(self.samples), key)
     }
 }
 
