@@ -175,7 +175,7 @@ impl CameraRays {
         }
         // One plain loop for each step: others do not vectorise.
         let along = |axis: usize| {
-            let (mx, my, mz) = (x_axis[axis], y_axis[axis], z_axis[axis] * -1.0);
+            let (mx, my, mz) = (x_axis[axis], y_axis[axis], -z_axis[axis]);
             let mut along = [0.0; N];
             for (along, (x, y)) in along.iter_mut().zip(x.iter().zip(&y)) {
                 *along = mx * x + my * y + mz;
