@@ -2,7 +2,7 @@
 //!
 //! A line is all that is within half its width of a straight piece. Such a stadium is convex, so a horizontal scanline meets it in one
 //! interval, whose part of a pixel's filter is known exactly. What is left is the integral over y, for which every row of pixels is cut
-//! into [`SCANLINES`]. Coverage is then within 1e-3 where an edge runs along the rows, and within 1e-4 elsewhere.
+//! into `SCANLINES`. Coverage is then within 1e-3 where an edge runs along the rows, and within 1e-4 elsewhere.
 
 use crate::film::Filter;
 use crate::math::DVec2;
