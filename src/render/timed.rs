@@ -274,7 +274,10 @@ mod tests {
                 let one_more = cost(f64::from(samples + 1)) - cost(f64::from(samples));
                 assert!(end < 1.02 * time, "cost {index}: {samples} samples end at {end} of {time}");
                 let is_most = samples == Scene::MAX_SAMPLES;
-                assert!(is_most || end + one_more > 0.88 * time, "cost {index}: {samples} samples end at {end} of {time}");
+                assert!(
+                    is_most || end + one_more > 0.88 * time,
+                    "cost {index}: {samples} samples end at {end} of {time}"
+                );
             }
         }
     }
