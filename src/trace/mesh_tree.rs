@@ -2,7 +2,8 @@
 
 use obvhs::aabb::Aabb;
 
-use super::tree::{BoxTree, Leaf};
+use super::eight::{Eights, Pairs};
+use super::tree::{BoxTree, Leaf, Visitor};
 use super::triangle::{NOT_AHEAD, Ray, TriangleHit};
 use crate::math::{Vec3, Vec3A, Vec4};
 use crate::scene::mesh::Mesh;
@@ -26,8 +27,9 @@ impl Block {
     #[inline(always)]
     pub fn triangle(&self, place: usize) -> Option<(u32, [Vec3; 3])> {
         let id = self.ids[place];
-        let corner = |vertex: &[Vec4; 3]| Vec3::from_array(vertex.each_ref().map(|axis| axis.as_ref()[place]));
-        (id != NONE).then(|| (id, self.corners.each_ref().map(corner)))
+        let corner = |[x, y, z]: &[Vec4; 3]| Vec3::new(x[place], y[place], z[place]);
+        let [a, b, c] = &self.corners;
+        (id != NONE).then(|| (id, [corner(a), corner(b), corner(c)]))
     }
 
     /// Shows each triangle that the ray meets within `*t_max` to `accept`. The tests are those of [`Ray::triangle`],
@@ -40,14 +42,16 @@ impl Block {
         t_max: &mut f32,
         accept: &mut impl FnMut(u32, TriangleHit, &mut f32) -> bool,
     ) -> bool {
-        let [kx, ky, kz] = ray.axes.map(|axis| axis.min(2));
+        let [kx, ky, kz] = ray.axes;
+        let (kx, ky, kz) = (kx.min(2), ky.min(2), kz.min(2));
         let origin = ray.origin.to_array();
-        let [x0, y0, z0] = [kx, ky, kz].map(|axis| Vec4::splat(origin[axis]));
-        let [sx, sy, sz] = ray.shear.to_array().map(Vec4::splat);
-        let [[ax, ay, az], [bx, by, bz], [cx, cy, cz]] = self.corners.each_ref().map(|corner| {
-            let z = corner[kz] - z0;
-            [corner[kx] - x0 - sx * z, corner[ky] - y0 - sy * z, z]
-        });
+        let from = [Vec4::splat(origin[kx]), Vec4::splat(origin[ky]), Vec4::splat(origin[kz])];
+        let shear = [Vec4::splat(ray.shear.x), Vec4::splat(ray.shear.y)];
+        let sz = Vec4::splat(ray.shear.z);
+        let [a, b, c] = &self.corners;
+        let [ax, ay, az] = sheared([a[kx], a[ky], a[kz]], from, shear);
+        let [bx, by, bz] = sheared([b[kx], b[ky], b[kz]], from, shear);
+        let [cx, cy, cz] = sheared([c[kx], c[ky], c[kz]], from, shear);
         let u = cx * by - cy * bx;
         let v = ax * cy - ay * cx;
         let w = bx * ay - by * ax;
@@ -90,6 +94,13 @@ impl Block {
         }
         true
     }
+}
+
+/// Four vertices in the space where the ray is the z axis, before z is scaled.
+#[inline(always)]
+fn sheared([x, y, z]: [Vec4; 3], [x0, y0, z0]: [Vec4; 3], [sx, sy]: [Vec4; 2]) -> [Vec4; 3] {
+    let z = z - z0;
+    [x - x0 - sx * z, y - y0 - sy * z, z]
 }
 
 /// A mesh's triangles under a hierarchy, in the mesh's own space.
@@ -168,10 +179,38 @@ impl MeshTree {
 
     /// Shows each triangle that the ray meets within `*t_max` to `accept`, with its id, roughly front to back.
     /// `accept` may lower `t_max` and returns whether to go on.
-    #[inline]
-    pub fn intersect(&self, ray: &Ray, t_max: &mut f32, mut accept: impl FnMut(u32, TriangleHit, &mut f32) -> bool) {
-        self.tree.traverse(ray, t_max, |leaf, t_max| {
-            self.blocks(&leaf).iter().all(|block| block.intersect(ray, leaf.near, t_max, &mut accept))
-        });
+    pub fn intersect(&self, ray: &Ray, t_max: &mut f32, accept: impl FnMut(u32, TriangleHit, &mut f32) -> bool) {
+        self.intersect_with(Pairs, ray, t_max, accept);
+    }
+
+    /// The same with chosen instructions.
+    #[inline(always)]
+    pub(super) fn intersect_with<E: Eights>(
+        &self,
+        eights: E,
+        ray: &Ray,
+        t_max: &mut f32,
+        accept: impl FnMut(u32, TriangleHit, &mut f32) -> bool,
+    ) {
+        self.tree.traverse(eights, ray, t_max, InLeaf { tree: self, ray, accept });
+    }
+}
+
+/// Looks at the triangles of leaves.
+struct InLeaf<'a, A> {
+    tree: &'a MeshTree,
+    ray: &'a Ray,
+    accept: A,
+}
+
+impl<A: FnMut(u32, TriangleHit, &mut f32) -> bool> Visitor for InLeaf<'_, A> {
+    #[inline(always)]
+    fn leaf<E: Eights>(&mut self, _: E, leaf: Leaf<'_>, t_max: &mut f32) -> bool {
+        for block in self.tree.blocks(&leaf) {
+            if !block.intersect(self.ray, leaf.near, t_max, &mut self.accept) {
+                return false;
+            }
+        }
+        true
     }
 }

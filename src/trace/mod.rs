@@ -14,6 +14,7 @@
 //! wherever in the world that is.
 
 mod cone;
+pub mod eight;
 mod hits;
 mod list;
 mod media;

@@ -8,10 +8,11 @@
 //! Rays whose largest components differ in axis or sign would need triangles sheared in different ways; they are no packet
 //! (`LaneRays::shear`) and are traced one at a time.
 
+use super::eight::{self, Eights};
 use super::mesh_tree::{MeshTree, WIDTH};
-use super::tree::{BOX_FAR_SCALE, BOX_NEAR_SCALE, Leaf, Slabs, Visitor};
+use super::tree::{BOX_FAR_SCALE, BOX_NEAR_SCALE, Leaf, Slabs, Visitor, max, min};
 use super::triangle::{MOST_SLACK, NOT_AHEAD, Ray, normal_and_size};
-use crate::math::{Mat3, Vec3, Vec4};
+use crate::math::{Mat3, Vec3};
 
 /// Rays of a packet.
 pub const LANES: usize = 16;
@@ -24,16 +25,6 @@ pub(super) type Lanes = [f32; LANES];
 
 /// The reach of a lane that takes part no more.
 pub(super) const DONE: f32 = -1.0;
-
-#[inline(always)]
-fn min(a: f32, b: f32) -> f32 {
-    if a < b { a } else { b }
-}
-
-#[inline(always)]
-fn max(a: f32, b: f32) -> f32 {
-    if a > b { a } else { b }
-}
 
 /// Combines all lanes, half with half: one after the other they would wait for each other.
 #[inline(always)]
@@ -194,16 +185,16 @@ impl LaneRays {
         let mut bundle = Bundle {
             near: [0, 1, 2],
             far: [3, 4, 5],
-            origin: [[Vec4::ZERO; 2]; 3],
-            inverse: [[Vec4::ZERO; 2]; 3],
+            origin: [[0.0; 2]; 3],
+            inverse: [[0.0; 2]; 3],
             mixed: [false; 3],
         };
         for axis in 0..3 {
             let (low, high) = (combined(self.origin[axis], min), largest(&self.origin[axis]));
             let (least, most) = (combined(self.inverse[axis], min), largest(&self.inverse[axis]));
             bundle.mixed[axis] = least < 0.0 && most > 0.0;
-            bundle.inverse[axis] = [least, most].map(Vec4::splat);
-            bundle.origin[axis] = [high, low].map(Vec4::splat);
+            bundle.inverse[axis] = [least, most];
+            bundle.origin[axis] = [high, low];
             if most < 0.0 {
                 std::mem::swap(&mut bundle.near[axis], &mut bundle.far[axis]);
                 bundle.origin[axis].swap(0, 1);
@@ -242,27 +233,27 @@ pub(super) struct Bundle {
     far: [usize; 3],
     /// By axis: the origin from which the near plane is least far ahead, and the one from which the far plane is
     /// farthest.
-    origin: [[Vec4; 2]; 3],
+    origin: [[f32; 2]; 3],
     /// Least and largest.
-    inverse: [[Vec4; 2]; 3],
+    inverse: [[f32; 2]; 3],
     /// Axes along which the rays go both ways: they bound nothing. The largest components of the rays of a packet have one
     /// axis and one sign, so there is always an axis that does.
     mixed: [bool; 3],
 }
 
-impl Slabs for Bundle {
+impl<E: Eights> Slabs<E> for Bundle {
     #[inline(always)]
-    fn distances(&self, planes: &[Vec4; 6]) -> (Vec4, Vec4) {
-        let (mut near, mut far) = (Vec4::NEG_INFINITY, Vec4::INFINITY);
+    fn distances(&self, e: E, planes: &[[f32; eight::WIDTH]; 6]) -> (E::Eight, E::Eight) {
+        let (mut near, mut far) = (e.splat(f32::NEG_INFINITY), e.splat(f32::INFINITY));
         for axis in 0..3 {
             if self.mixed[axis] {
                 continue;
             }
-            let [least, most] = self.inverse[axis];
-            let ahead = planes[self.near[axis]] - self.origin[axis][0];
-            near = near.max((ahead * least).min(ahead * most));
-            let ahead = planes[self.far[axis]] - self.origin[axis][1];
-            far = far.min((ahead * least).max(ahead * most));
+            let (least, most) = (e.splat(self.inverse[axis][0]), e.splat(self.inverse[axis][1]));
+            let ahead = e.sub(e.load(&planes[self.near[axis].min(5)]), e.splat(self.origin[axis][0]));
+            let behind = e.sub(e.load(&planes[self.far[axis].min(5)]), e.splat(self.origin[axis][1]));
+            near = e.max(near, e.min(e.mul(ahead, least), e.mul(ahead, most)));
+            far = e.min(far, e.max(e.mul(behind, least), e.mul(behind, most)));
         }
         (near, far)
     }
@@ -316,9 +307,9 @@ pub(super) trait Visit {
 
 /// Shows each triangle that a ray of a packet meets to `visit`.
 #[inline(always)]
-pub(super) fn intersect(tree: &MeshTree, rays: &LaneRays, shear: &Shear, visit: &mut impl Visit) {
+pub(super) fn intersect<E: Eights>(eights: E, tree: &MeshTree, rays: &LaneRays, shear: &Shear, visit: &mut impl Visit) {
     let mut farthest = largest(visit.reach());
-    tree.tree().walk(&rays.bundle(), &mut farthest, InLeaf { tree, rays, shear, visit });
+    tree.tree().walk(eights, &rays.bundle(), &mut farthest, InLeaf { tree, rays, shear, visit });
 }
 
 /// Looks at the triangles of leaves.
@@ -331,7 +322,7 @@ struct InLeaf<'a, V> {
 
 impl<V: Visit> Visitor for InLeaf<'_, V> {
     #[inline(always)]
-    fn leaf(&mut self, leaf: Leaf<'_>, farthest: &mut f32) -> bool {
+    fn leaf<E: Eights>(&mut self, _: E, leaf: Leaf<'_>, farthest: &mut f32) -> bool {
         let Self { tree, rays, shear, visit } = self;
         let (near, mut limit, any) = rays.enter(&leaf, visit.reach());
         if any {

@@ -1,4 +1,4 @@
-//! Bounding volume hierarchies: obvhs builds binary ones, whose nodes are merged into nodes of four; the traversal is ours.
+//! Bounding volume hierarchies: obvhs builds binary ones, whose nodes are merged into nodes of eight; the traversal is ours.
 //!
 //! obvhs' own ray loop clamps directions at 1e-7 and does not round its box test outwards, so a ray may miss a box
 //! whose triangle it meets. Here the far distance is widened as Ize shows ("Robust BVH Ray Traversal", JCGT 2013), and
@@ -21,22 +21,21 @@ use obvhs::bvh2::builder::build_bvh2;
 use obvhs::bvh2::node::Bvh2Node;
 use smallvec::{SmallVec, smallvec};
 
+use super::eight::{Eights, WIDTH};
 use super::triangle::Ray;
-use crate::math::{Vec3, Vec4};
+use crate::math::Vec3;
 
 /// 1 + 2 γ(3) in single precision, rounded up (Ize 2013, section 3).
 pub(super) const BOX_FAR_SCALE: f32 = 1.000_000_4;
 /// The distance to a box and the one to a triangle on its face are rounded differently; this covers both.
 pub(super) const BOX_NEAR_SCALE: f32 = 0.999_998;
-/// Children of a node.
-const WIDTH: usize = 4;
 
-/// Four children and their boxes.
+/// Eight children and their boxes.
 #[derive(Clone, Copy)]
 #[repr(C, align(64))]
 struct Node {
     /// Low x, y, z, then high x, y, z of all children. Boxes of absent children are inside out, so that no ray enters them.
-    planes: [Vec4; 6],
+    planes: [[f32; WIDTH]; 6],
     /// Where a child's places start, or which node it is.
     first: [u32; WIDTH],
     /// How many places a child has; 0 for nodes.
@@ -46,12 +45,12 @@ struct Node {
 impl Node {
     const EMPTY: Self = Self {
         planes: [
-            Vec4::INFINITY,
-            Vec4::INFINITY,
-            Vec4::INFINITY,
-            Vec4::NEG_INFINITY,
-            Vec4::NEG_INFINITY,
-            Vec4::NEG_INFINITY,
+            [f32::INFINITY; WIDTH],
+            [f32::INFINITY; WIDTH],
+            [f32::INFINITY; WIDTH],
+            [f32::NEG_INFINITY; WIDTH],
+            [f32::NEG_INFINITY; WIDTH],
+            [f32::NEG_INFINITY; WIDTH],
         ],
         first: [0; WIDTH],
         count: [0; WIDTH],
@@ -84,61 +83,84 @@ impl Leaf<'_> {
     #[inline(always)]
     #[must_use]
     pub(super) fn planes(&self) -> [f32; 6] {
-        self.node.planes.each_ref().map(|plane| plane.as_ref()[self.child])
+        self.node.planes.each_ref().map(|plane| plane[self.child])
     }
 }
 
 /// What goes down a tree: a ray, or the bounds of several.
-pub trait Slabs {
-    /// Distances at which four boxes, given by their planes, are entered and left, as they are before they are scaled.
-    fn distances(&self, planes: &[Vec4; 6]) -> (Vec4, Vec4);
+pub trait Slabs<E: Eights> {
+    /// Distances at which eight boxes, given by their planes, are entered and left, as they are before they are scaled.
+    fn distances(&self, eights: E, planes: &[[f32; WIDTH]; 6]) -> (E::Eight, E::Eight);
 }
 
 /// Looks into leaves. A closure does; packets have types of their own, because what runs under wider instructions has to be
 /// inlined, which no closure can be made to be.
 pub trait Visitor {
     /// Looks into a leaf that is entered within `t_max`, which it may lower; returns whether to go on.
-    fn leaf(&mut self, leaf: Leaf<'_>, t_max: &mut f32) -> bool;
+    fn leaf<E: Eights>(&mut self, eights: E, leaf: Leaf<'_>, t_max: &mut f32) -> bool;
 }
 
 impl<F: FnMut(Leaf<'_>, &mut f32) -> bool> Visitor for F {
     #[inline(always)]
-    fn leaf(&mut self, leaf: Leaf<'_>, t_max: &mut f32) -> bool {
+    fn leaf<E: Eights>(&mut self, _: E, leaf: Leaf<'_>, t_max: &mut f32) -> bool {
         self(leaf, t_max)
     }
 }
 
 /// A ray as the box test sees it.
-struct RaySlabs {
-    origin: [Vec4; 3],
-    inverse: [Vec4; 3],
+struct RaySlabs<E: Eights> {
+    origin: [E::Eight; 3],
+    inverse: [E::Eight; 3],
     /// Which planes are entered and left, by axis.
     near: [usize; 3],
     far: [usize; 3],
 }
 
-impl RaySlabs {
+impl<E: Eights> RaySlabs<E> {
     #[inline(always)]
-    fn new(ray: &Ray) -> Self {
-        let negative = [0, 1, 2].map(|axis| ray.inverse[axis] < 0.0);
-        let [x, y, z] = negative.map(|negative| if negative { 3 } else { 0 });
+    fn new(eights: E, ray: &Ray) -> Self {
+        let side = |inverse: f32| if inverse < 0.0 { 3 } else { 0 };
+        let (x, y, z) = (side(ray.inverse.x), side(ray.inverse.y), side(ray.inverse.z));
+        let (origin, inverse) = (ray.origin, ray.inverse);
         Self {
-            origin: ray.origin.to_array().map(Vec4::splat),
-            inverse: ray.inverse.to_array().map(Vec4::splat),
+            origin: [eights.splat(origin.x), eights.splat(origin.y), eights.splat(origin.z)],
+            inverse: [eights.splat(inverse.x), eights.splat(inverse.y), eights.splat(inverse.z)],
             near: [x, 1 + y, 2 + z],
             far: [3 - x, 4 - y, 5 - z],
         }
     }
 }
 
-impl Slabs for RaySlabs {
+impl<E: Eights> RaySlabs<E> {
+    /// Distances to the planes of three axes.
     #[inline(always)]
-    fn distances(&self, planes: &[Vec4; 6]) -> (Vec4, Vec4) {
-        let distance = |plane: usize, axis: usize| (planes[plane] - self.origin[axis]) * self.inverse[axis];
-        let [nx, ny, nz] = [0, 1, 2].map(|axis| distance(self.near[axis], axis));
-        let [fx, fy, fz] = [0, 1, 2].map(|axis| distance(self.far[axis], axis));
-        (nx.max(ny).max(nz), fx.min(fy).min(fz))
+    fn at(&self, e: E, planes: &[[f32; WIDTH]; 6], [x, y, z]: [usize; 3]) -> [E::Eight; 3] {
+        let ([ox, oy, oz], [ix, iy, iz]) = (self.origin, self.inverse);
+        [
+            e.mul(e.sub(e.load(&planes[x.min(5)]), ox), ix),
+            e.mul(e.sub(e.load(&planes[y.min(5)]), oy), iy),
+            e.mul(e.sub(e.load(&planes[z.min(5)]), oz), iz),
+        ]
     }
+}
+
+impl<E: Eights> Slabs<E> for RaySlabs<E> {
+    #[inline(always)]
+    fn distances(&self, e: E, planes: &[[f32; WIDTH]; 6]) -> (E::Eight, E::Eight) {
+        let [nx, ny, nz] = self.at(e, planes, self.near);
+        let [fx, fy, fz] = self.at(e, planes, self.far);
+        (e.max(e.max(nx, ny), nz), e.min(e.min(fx, fy), fz))
+    }
+}
+
+#[inline(always)]
+pub(super) fn min(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
+}
+
+#[inline(always)]
+pub(super) fn max(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
 }
 
 /// A hierarchy over any boxes. Its leaves are runs of [`BoxTree::order`].
@@ -195,16 +217,16 @@ impl BoxTree {
 
     /// Visits the leaves that a ray enters within `*t_max`, roughly front to back. `visit` may lower `t_max` and returns
     /// whether to go on.
-    #[inline]
-    pub fn traverse(&self, ray: &Ray, t_max: &mut f32, visit: impl FnMut(Leaf<'_>, &mut f32) -> bool) {
+    #[inline(always)]
+    pub fn traverse<E: Eights>(&self, eights: E, ray: &Ray, t_max: &mut f32, visit: impl Visitor) {
         if ray.is_sound() {
-            self.walk(&RaySlabs::new(ray), t_max, visit);
+            self.walk(eights, &RaySlabs::new(eights, ray), t_max, visit);
         }
     }
 
     /// The same for anything that has slab distances, none of which may be NaN.
     #[inline(always)]
-    pub fn walk(&self, slabs: &impl Slabs, t_max: &mut f32, mut visit: impl Visitor) {
+    pub fn walk<E: Eights>(&self, e: E, slabs: &impl Slabs<E>, t_max: &mut f32, mut visit: impl Visitor) {
         if self.nodes.is_empty() {
             return;
         }
@@ -212,47 +234,44 @@ impl BoxTree {
         let mut at = 0;
         loop {
             let node = &self.nodes[at];
-            let (near, far) = slabs.distances(&node.planes);
-            let near = near.max(Vec4::ZERO) * BOX_NEAR_SCALE;
-            let far = far * BOX_FAR_SCALE;
-            let entered = near.cmple(far.min(Vec4::splat(*t_max))).bitmask();
+            let (near, far) = slabs.distances(e, &node.planes);
+            let near = e.mul(e.max(near, e.splat(0.0)), e.splat(BOX_NEAR_SCALE));
+            let far = e.min(e.mul(far, e.splat(BOX_FAR_SCALE)), e.splat(*t_max));
+            let mut left = e.at_most(near, far);
+            let nears = e.store(near);
             // A key is a distance and a child; distances are not negative, so keys are in their order.
-            let nears = near.to_array();
-            let key = |child: u32| {
-                let child = child & (WIDTH as u32 - 1);
+            let key = |left: u32| {
+                let child = left.trailing_zeros() & (WIDTH as u32 - 1);
                 u64::from(nears[child as usize].to_bits()) << 32 | u64::from(at as u32 * WIDTH as u32 + child)
             };
-            let mut left = entered;
             let mut next = None;
             if left != 0 {
-                let mut nearest = key(left.trailing_zeros());
+                let mut nearest = key(left);
                 left &= left - 1;
                 if left != 0 {
-                    let mut second = key(left.trailing_zeros());
+                    let mut second = key(left);
                     left &= left - 1;
                     if second < nearest {
                         std::mem::swap(&mut nearest, &mut second);
                     }
                     if left != 0 {
-                        let mut third = key(left.trailing_zeros());
-                        left &= left - 1;
-                        if left != 0 {
-                            let mut fourth = key(left.trailing_zeros());
-                            if fourth < third {
-                                std::mem::swap(&mut third, &mut fourth);
+                        // Farthest first.
+                        let mut keys = [0; WIDTH];
+                        (keys[0], keys[1]) = (second, nearest);
+                        let mut count = 2;
+                        while left != 0 && count < WIDTH {
+                            let key = key(left);
+                            left &= left - 1;
+                            let mut place = count;
+                            while place > 0 && keys[place - 1] < key {
+                                keys[place] = keys[place - 1];
+                                place -= 1;
                             }
-                            if third < nearest {
-                                std::mem::swap(&mut nearest, &mut third);
-                            }
-                            if fourth < second {
-                                std::mem::swap(&mut second, &mut fourth);
-                            }
-                            stack.push(fourth);
-                        } else if third < nearest {
-                            std::mem::swap(&mut nearest, &mut third);
+                            keys[place] = key;
+                            count += 1;
                         }
-                        stack.push(second.max(third));
-                        stack.push(second.min(third));
+                        nearest = keys[count - 1];
+                        keys[..count - 1].iter().for_each(|key| stack.push(*key));
                     } else {
                         stack.push(second);
                     }
@@ -271,7 +290,7 @@ impl BoxTree {
                 if places.1 == 0 {
                     break places.0 as usize;
                 }
-                if !visit.leaf(Leaf { places, near, node, child }, t_max) {
+                if !visit.leaf(e, Leaf { places, near, node, child }, t_max) {
                     return;
                 }
             };
@@ -279,8 +298,8 @@ impl BoxTree {
     }
 }
 
-/// Merges a binary hierarchy into nodes of four: of the children of a node the largest is replaced by its own two until
-/// there are four. The children of a node stand next to each other.
+/// Merges a binary hierarchy into nodes of eight: of the children of a node the largest is replaced by its own two until
+/// there are eight. The children of a node stand next to each other.
 fn merge(pairs: &[Bvh2Node]) -> Vec<Node> {
     let mut nodes = vec![Node::EMPTY];
     // Nodes to fill, with what of the binary tree they stand for.
@@ -326,7 +345,7 @@ struct Stack {
 }
 
 impl Stack {
-    const INLINE: usize = 40;
+    const INLINE: usize = 48;
 
     #[inline(always)]
     fn new() -> Self {

@@ -6,7 +6,7 @@
 //! is computed again in double, where the products are exact.
 
 use super::gamma;
-use crate::math::Vec3;
+use crate::math::{Vec3, Vec4};
 
 /// Roundings on a ray's way into an object's space, with those of the matrix and of where it left a surface.
 const START_ROUNDINGS: u32 = 12;
@@ -55,6 +55,7 @@ pub struct TriangleHit {
 impl Ray {
     /// A ray. One whose `origin` or `direction` is not finite, or whose `direction` is zero, meets nothing: an absurd
     /// transform can make such rays in an object's own space.
+    #[inline]
     #[must_use]
     pub fn new(origin: Vec3, direction: Vec3) -> Self {
         let magnitude = direction.abs();
@@ -70,11 +71,13 @@ impl Ray {
         if direction[z] < 0.0 {
             std::mem::swap(&mut x, &mut y);
         }
-        let shear = Vec3::new(direction[x] / direction[z], direction[y] / direction[z], 1.0 / direction[z]);
+        // Divisions in pairs: three take as long as one.
+        let along = direction[z];
+        let shear = (Vec4::new(direction[x], direction[y], 1.0, 1.0) / Vec4::splat(along)).truncate();
         // A component of exactly 0 would make 0 · ∞ = NaN at a box face that contains the origin. At 1e-30 the ray
         // strays less than a unit in the last place over any distance a float can hold beside its origin.
-        let safe = |d: f32| 1.0 / if d.abs() < 1e-30 { 1e-30_f32.copysign(d) } else { d };
-        let inverse = Vec3::new(safe(direction.x), safe(direction.y), safe(direction.z));
+        let safe = |d: f32| if d.abs() < 1e-30 { 1e-30_f32.copysign(d) } else { d };
+        let inverse = (Vec4::ONE / Vec4::new(safe(direction.x), safe(direction.y), safe(direction.z), 1.0)).truncate();
         Self { origin, direction, inverse, grain: Vec3::ZERO, axes: [x, y, z], shear }
     }
 

@@ -5,8 +5,9 @@ use std::sync::Arc;
 use obvhs::aabb::Aabb;
 use rayon::prelude::*;
 
+use super::eight::{Eights, Task, dispatch};
 use super::mesh_tree::MeshTree;
-use super::tree::BoxTree;
+use super::tree::{BoxTree, Leaf, Visitor};
 use super::triangle::Ray;
 use crate::math::{DVec3, Mat3, Vec3, Vec3A};
 use crate::scene::Scene;
@@ -73,6 +74,7 @@ impl PlacedObject {
         self.mesh.slots.get(triangle as usize).map_or(0, |slot| usize::from(*slot))
     }
 
+    #[inline(always)]
     pub(super) fn to_object(&self, ray: &Ray) -> Ray {
         let origin = self.object_from_world * (ray.origin - self.translation);
         Ray { grain: self.grain(ray.origin), ..Ray::new(origin, self.object_from_world * ray.direction) }
@@ -224,39 +226,63 @@ impl World {
         ray: &Ray,
         kind: RayKinds,
         t_max: f32,
-        mut accept: impl FnMut(Hit, f32, &mut f32) -> bool,
+        accept: impl FnMut(Hit, f32, &mut f32) -> bool,
     ) {
-        let culls = kind != RayKinds::SHADOW;
-        let mut t_max = t_max;
-        self.tree.traverse(ray, &mut t_max, |leaf, t_max| {
-            for id in &self.tree.order[leaf.range()] {
-                let object = &self.objects[*id as usize];
-                if !object.visible_to.contains(kind) {
-                    continue;
-                }
-                let mut go_on = true;
-                object.tree.intersect(&object.to_object(ray), t_max, |triangle, hit, t_max| {
-                    if culls && !hit.front && object.single_sided[object.slot(triangle)] {
-                        return true;
-                    }
-                    let slack = hit.slack;
-                    let hit = Hit {
-                        t: hit.t.max(leaf.near),
-                        object: ObjectId(*id),
-                        triangle,
-                        barycentric: [hit.u, hit.v],
-                        front: hit.front,
-                        crowded: false,
-                    };
-                    go_on = accept(hit, slack, t_max);
-                    go_on
-                });
-                if !go_on {
-                    return false;
-                }
+        dispatch(self.arch, Hits { world: self, ray, kind, t_max, accept });
+    }
+}
+
+/// Shows hits of a ray.
+struct Hits<'a, A> {
+    world: &'a World,
+    ray: &'a Ray,
+    kind: RayKinds,
+    t_max: f32,
+    accept: A,
+}
+
+impl<A: FnMut(Hit, f32, &mut f32) -> bool> Task for Hits<'_, A> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<E: Eights>(self, eights: E) {
+        let mut t_max = self.t_max;
+        self.world.tree.traverse(eights, self.ray, &mut t_max, self);
+    }
+}
+
+impl<A: FnMut(Hit, f32, &mut f32) -> bool> Visitor for Hits<'_, A> {
+    #[inline(always)]
+    fn leaf<E: Eights>(&mut self, eights: E, leaf: Leaf<'_>, t_max: &mut f32) -> bool {
+        let Self { world, ray, kind, accept, .. } = self;
+        let culls = *kind != RayKinds::SHADOW;
+        for id in &world.tree.order[leaf.range()] {
+            let object = &world.objects[*id as usize];
+            if !object.visible_to.contains(*kind) {
+                continue;
             }
-            true
-        });
+            let mut go_on = true;
+            object.tree.intersect_with(eights, &object.to_object(ray), t_max, |triangle, hit, t_max| {
+                if culls && !hit.front && object.single_sided[object.slot(triangle)] {
+                    return true;
+                }
+                let slack = hit.slack;
+                let hit = Hit {
+                    t: hit.t.max(leaf.near),
+                    object: ObjectId(*id),
+                    triangle,
+                    barycentric: [hit.u, hit.v],
+                    front: hit.front,
+                    crowded: false,
+                };
+                go_on = accept(hit, slack, t_max);
+                go_on
+            });
+            if !go_on {
+                return false;
+            }
+        }
+        true
     }
 }
 

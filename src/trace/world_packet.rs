@@ -1,6 +1,7 @@
 //! Packets of rays through the world. What they find is what [`World::closest`] and [`World::blocked`] find of each ray, bit for
 //! bit.
 
+use super::eight::{Eights, Task, dispatch};
 use super::packet::{self, DONE, LANES, LaneHits, LaneRays, Lanes, RayStart, Visit, intersect, largest};
 use super::tree::{Leaf, Visitor};
 use super::triangle::Ray;
@@ -54,7 +55,7 @@ impl World {
         let mut reach = [DONE; LANES];
         reach.iter_mut().zip(rays).for_each(|(reach, ray)| *reach = ray.reach);
         let search = Blocked { world: self, rays: &packet, shadow: rays, opaque, reach };
-        if let Some(found) = self.arch.dispatch(search) {
+        if let Some(found) = dispatch(self.arch, search) {
             ways = found;
         }
         ways
@@ -67,7 +68,7 @@ impl World {
             self.closest(&Ray::new(origin, direction), kind, f32::INFINITY)
         };
         let traced = (count >= FEWEST)
-            .then(|| self.arch.dispatch(Closest { world: self, rays, kind, found: Found::new(count) }))
+            .then(|| dispatch(self.arch, Closest { world: self, rays, kind, found: Found::new(count) }))
             .flatten();
         match traced {
             // Most packets of the background meet nothing at all.
@@ -168,15 +169,29 @@ trait Search {
     fn reach(&self) -> &Lanes;
 
     /// Looks at an object of a number: with the rays in its space, where they enter its box, and how far they reach in it.
-    fn object(&mut self, id: u32, object: &PlacedObject, placed: &LaneRays, near: &Lanes, limit: Lanes);
+    fn object<E: Eights>(
+        &mut self,
+        eights: E,
+        id: u32,
+        object: &PlacedObject,
+        placed: &LaneRays,
+        near: &Lanes,
+        limit: Lanes,
+    );
 }
 
 /// Shows each object that rays of a packet may meet to `search`. `None` if the rays are no packet.
 #[inline(always)]
-fn each_object(world: &World, rays: &LaneRays, kind: RayKinds, search: &mut impl Search) -> Option<()> {
+fn each_object<E: Eights>(
+    eights: E,
+    world: &World,
+    rays: &LaneRays,
+    kind: RayKinds,
+    search: &mut impl Search,
+) -> Option<()> {
     rays.shear()?;
     let mut farthest = largest(search.reach());
-    world.tree.walk(&rays.bundle(), &mut farthest, Objects { world, rays, kind, search });
+    world.tree.walk(eights, &rays.bundle(), &mut farthest, Objects { world, rays, kind, search });
     Some(())
 }
 
@@ -190,7 +205,7 @@ struct Objects<'a, S> {
 
 impl<S: Search> Visitor for Objects<'_, S> {
     #[inline(always)]
-    fn leaf(&mut self, leaf: Leaf<'_>, farthest: &mut f32) -> bool {
+    fn leaf<E: Eights>(&mut self, eights: E, leaf: Leaf<'_>, farthest: &mut f32) -> bool {
         let Self { world, rays, kind, search } = self;
         let (near, _, any) = rays.enter(&leaf, search.reach());
         if any {
@@ -199,7 +214,7 @@ impl<S: Search> Visitor for Objects<'_, S> {
                 if object.visible_to.contains(*kind) {
                     let (_, limit, _) = rays.enter(&leaf, search.reach());
                     let placed = rays.placed(&object.object_from_world, object.translation);
-                    search.object(*id, object, &placed, &near, limit);
+                    search.object(eights, *id, object, &placed, &near, limit);
                 }
             }
             *farthest = largest(search.reach());
@@ -231,12 +246,20 @@ impl Search for Nearest<'_> {
     }
 
     #[inline(always)]
-    fn object(&mut self, id: u32, object: &PlacedObject, placed: &LaneRays, near: &Lanes, reach: Lanes) {
+    fn object<E: Eights>(
+        &mut self,
+        eights: E,
+        id: u32,
+        object: &PlacedObject,
+        placed: &LaneRays,
+        near: &Lanes,
+        reach: Lanes,
+    ) {
         let size = placed.largest_start().max(object.grain(Vec3::splat(self.farthest)).max_element());
         let (rays, culls, found) = (self.rays, self.culls, &mut self.found);
         let mut search = InObject { found, id, object, rays, size, culls, near, reach };
         match placed.shear() {
-            Some(shear) => intersect(&object.tree, placed, &shear, &mut search),
+            Some(shear) => intersect(eights, &object.tree, placed, &shear, &mut search),
             None => packet::one_by_one(&object.tree, placed, &mut search),
         }
     }
@@ -285,15 +308,15 @@ impl Visit for InObject<'_> {
     }
 }
 
-impl pulp::WithSimd for Closest<'_> {
+impl Task for Closest<'_> {
     type Output = Option<Found>;
 
     #[inline(always)]
-    fn with_simd<S: pulp::Simd>(self, _: S) -> Self::Output {
+    fn run<E: Eights>(self, eights: E) -> Self::Output {
         let Self { world, rays, kind, found } = self;
         let culls = kind != RayKinds::SHADOW;
         let mut search = Nearest { rays, culls, farthest: rays.largest_start(), found };
-        each_object(world, rays, kind, &mut search)?;
+        each_object(eights, world, rays, kind, &mut search)?;
         Some(search.found)
     }
 }
@@ -347,11 +370,19 @@ impl<O: Fn(MaterialId) -> bool> Search for Ways<'_, O> {
     }
 
     #[inline(always)]
-    fn object(&mut self, id: u32, object: &PlacedObject, placed: &LaneRays, _: &Lanes, reach: Lanes) {
+    fn object<E: Eights>(
+        &mut self,
+        eights: E,
+        id: u32,
+        object: &PlacedObject,
+        placed: &LaneRays,
+        _: &Lanes,
+        reach: Lanes,
+    ) {
         let size = placed.largest_start().max(object.grain(Vec3::splat(self.farthest)).max_element());
         let mut search = AnyInObject { id, object, size, reach, found: self };
         match placed.shear() {
-            Some(shear) => intersect(&object.tree, placed, &shear, &mut search),
+            Some(shear) => intersect(eights, &object.tree, placed, &shear, &mut search),
             None => packet::one_by_one(&object.tree, placed, &mut search),
         }
     }
@@ -403,15 +434,15 @@ impl<O: Fn(MaterialId) -> bool> Visit for AnyInObject<'_, '_, O> {
     }
 }
 
-impl<O: Fn(MaterialId) -> bool> pulp::WithSimd for Blocked<'_, O> {
+impl<O: Fn(MaterialId) -> bool> Task for Blocked<'_, O> {
     type Output = Option<[Way; LANES]>;
 
     #[inline(always)]
-    fn with_simd<S: pulp::Simd>(self, _: S) -> Self::Output {
+    fn run<E: Eights>(self, eights: E) -> Self::Output {
         let Self { world, rays, shadow, opaque, reach } = self;
         let farthest = rays.largest_start();
         let mut search = Ways { rays, shadow, opaque, farthest, reach, ways: [Way::Clear; LANES] };
-        each_object(world, rays, RayKinds::SHADOW, &mut search)?;
+        each_object(eights, world, rays, RayKinds::SHADOW, &mut search)?;
         Some(search.ways)
     }
 }

@@ -103,6 +103,20 @@ fn measure(name: &str, scene: &Scene) {
         })
         .collect();
 
+    if let Ok(k) = std::env::var("ONLY") {
+        let (r, f): (_, Trace) = match &k[..] {
+            "bounce" => (&bounce, closest),
+            "shadow" => (&shadow, blocked),
+            _ => (&camera, closest),
+        };
+        let t = CpuClock::process();
+        let mut n = 0;
+        while t.seconds() < 4.0 {
+            n += f(&world, r);
+        }
+        println!("{n}");
+        return;
+    }
     for threads in [1, std::thread::available_parallelism().map_or(1, usize::from)] {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads can be started");
         let line = |kind: &str, rays: &[ShadowRay], single: Trace, packets: Option<Trace>| {
