@@ -9,7 +9,7 @@ use tusche::scene::mesh::Mesh;
 use tusche::scene::settings::RayKinds;
 use tusche::scene::{Object, SceneBuilder};
 use tusche::trace::World;
-use tusche::trace::packet::{LANES, RayStart};
+use tusche::trace::packet::{LANES, RayPacket, RayStart};
 use tusche::trace::triangle::Ray;
 use tusche::trace::world::Hit;
 use tusche::trace::world_packet::{ShadowRay, Way};
@@ -120,7 +120,7 @@ proptest! {
     ) {
         for rays in packets {
             for kind in [RayKinds::CAMERA, RayKinds::REFLECTION] {
-                let found = world.closest_of(&rays, kind);
+                let found = world.closest_of(&RayPacket::of(rays.iter().copied()), kind);
                 for (lane, &(origin, direction)) in rays.iter().enumerate() {
                     let single = world.closest(&Ray::new(origin, direction), kind, f32::INFINITY);
                     prop_assert_eq!(bits(found[lane]), bits(single), "{} {}", origin, direction);

@@ -13,6 +13,7 @@ use super::mesh_tree::{MeshTree, WIDTH};
 use super::tree::{BOX_FAR_SCALE, BOX_NEAR_SCALE, Leaf, Slabs, Visitor, max, min};
 use super::triangle::{MOST_SLACK, NOT_AHEAD, Ray, normal_and_size};
 use crate::math::{Mat3, Vec3};
+use crate::scene::camera::CameraRays;
 
 /// Rays of a packet.
 pub const LANES: usize = 16;
@@ -59,6 +60,63 @@ fn product(matrix: &Mat3, [x, y, z]: &[Lanes; 3]) -> [Lanes; 3] {
     })
 }
 
+/// At most [`LANES`] rays, number by number.
+#[derive(Clone, Debug)]
+pub struct RayPacket {
+    pub(super) origin: [Lanes; 3],
+    pub(super) direction: [Lanes; 3],
+    /// How many they are. Behind them the last is repeated.
+    count: usize,
+}
+
+impl RayPacket {
+    /// The first [`LANES`] of some rays.
+    #[must_use]
+    pub fn of(rays: impl IntoIterator<Item = RayStart>) -> Self {
+        let mut packet = Self { origin: [[0.0; LANES]; 3], direction: [[0.0; LANES]; 3], count: 0 };
+        for (lane, (origin, direction)) in rays.into_iter().take(LANES).enumerate() {
+            for axis in 0..3 {
+                packet.origin[axis][lane] = origin[axis];
+                packet.direction[axis][lane] = direction[axis];
+            }
+            packet.count += 1;
+        }
+        if let Some(last) = packet.count.checked_sub(1) {
+            for lanes in packet.origin.iter_mut().chain(&mut packet.direction) {
+                let value = lanes[last];
+                lanes[last..].fill(value);
+            }
+        }
+        packet
+    }
+
+    /// The rays of a camera through the first `count` of some film positions; the others are to be the last of these.
+    #[inline(always)]
+    pub(super) fn of_camera(camera: &CameraRays, film: &[([i32; 2], [f32; 2]); LANES], count: usize) -> Self {
+        let (origin, direction) = camera.rays(film);
+        Self { origin, direction, count: count.min(LANES) }
+    }
+
+    /// How many rays there are.
+    #[inline]
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.count
+    }
+
+    /// Origin and direction of one of the rays.
+    #[inline]
+    #[must_use]
+    pub fn ray_start(&self, lane: usize) -> RayStart {
+        (Vec3::from_array(lane_of(&self.origin, lane)), Vec3::from_array(lane_of(&self.direction, lane)))
+    }
+}
+
+#[inline(always)]
+fn lane_of([x, y, z]: &[Lanes; 3], lane: usize) -> [f32; 3] {
+    [x[lane], y[lane], z[lane]]
+}
+
 /// The rays of a packet in one space.
 #[derive(Clone, Copy)]
 pub(super) struct LaneRays {
@@ -68,21 +126,6 @@ pub(super) struct LaneRays {
 }
 
 impl LaneRays {
-    /// Some rays, the last of them repeated; none of no rays.
-    #[inline(always)]
-    pub fn of(rays: &[RayStart]) -> Option<Self> {
-        let last = rays.last()?;
-        let (mut origin, mut direction) = ([[0.0; LANES]; 3], [[0.0; LANES]; 3]);
-        for i in 0..LANES {
-            let (from, towards) = rays.get(i).unwrap_or(last);
-            for axis in 0..3 {
-                origin[axis][i] = from[axis];
-                direction[axis][i] = towards[axis];
-            }
-        }
-        Some(Self::new(origin, direction))
-    }
-
     /// Rays by axis.
     #[inline(always)]
     pub fn new(origin: [Lanes; 3], direction: [Lanes; 3]) -> Self {
@@ -121,20 +164,13 @@ impl LaneRays {
     /// Where one of the rays starts.
     #[inline]
     pub fn start(&self, lane: usize) -> Vec3 {
-        Vec3::from_array(self.origin.each_ref().map(|axis| axis[lane]))
-    }
-
-    /// Origin and direction of one of the rays.
-    #[inline]
-    pub fn ray_start(&self, lane: usize) -> RayStart {
-        (self.start(lane), Vec3::from_array(self.direction.each_ref().map(|axis| axis[lane])))
+        Vec3::from_array(lane_of(&self.origin, lane))
     }
 
     /// One of the rays, with its grain.
     #[inline]
     pub fn ray(&self, lane: usize, grain: Vec3) -> Ray {
-        let (origin, direction) = self.ray_start(lane);
-        Ray { grain, ..Ray::new(origin, direction) }
+        Ray { grain, ..Ray::new(self.start(lane), Vec3::from_array(lane_of(&self.direction, lane))) }
     }
 
     /// What the triangle test needs; `None` if the rays are no packet.

@@ -8,11 +8,9 @@
 
 use std::ops::Range;
 
-use smallvec::SmallVec;
-
 use super::cone::Cone;
 use super::media::Seen;
-use super::packet::{LANES, RayStart};
+use super::packet::{LANES, RayPacket};
 use super::ray_tree::{Run, TreeNode, WaveHit, WaveRay};
 use super::record::TileRecord;
 use super::surface::Surface;
@@ -435,8 +433,8 @@ impl<'a> TileTracer<'a> {
         if !rays.iter().all(is_plain) {
             return [None; LANES];
         }
-        let starts: SmallVec<[RayStart; LANES]> = rays.iter().map(|ray| (ray.origin, ray.direction)).collect();
-        self.world.closest_of(&starts, RayKinds::CAMERA).map(Some)
+        let packet = RayPacket::of(rays.iter().map(|ray| (ray.origin, ray.direction)));
+        self.world.closest_of(&packet, RayKinds::CAMERA).map(Some)
     }
 
     /// A hit on its way to be shaded.

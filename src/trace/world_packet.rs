@@ -2,10 +2,9 @@
 //! bit.
 
 use super::eight::{Eights, Task, dispatch};
-use super::packet::{self, DONE, LANES, LaneHits, LaneRays, Lanes, RayStart, Visit, intersect, largest};
+use super::packet::{self, DONE, LANES, LaneHits, LaneRays, Lanes, RayPacket, RayStart, Visit, intersect, largest};
 use super::tree::{Leaf, Visitor};
 use super::triangle::Ray;
-use smallvec::SmallVec;
 
 use super::world::{Facet, Hit, PlacedObject, World};
 use crate::math::Vec3;
@@ -20,83 +19,79 @@ const FEWEST: usize = 4;
 const MOST_CHANGES: usize = 6;
 
 impl World {
-    /// The closest hits of at most [`LANES`] rays of one kind, as [`Self::closest`] finds them one by one. Quickest where the
-    /// rays go much the same way.
+    /// The closest hits of rays of one kind, as [`Self::closest`] finds them one by one. Quickest where the rays go much the
+    /// same way.
     #[must_use]
-    pub fn closest_of(&self, rays: &[RayStart], kind: RayKinds) -> [Option<Hit>; LANES] {
-        match LaneRays::of(rays) {
-            Some(packet) => self.closest_of_lanes(&packet, rays.len().min(LANES), kind),
-            None => [None; LANES],
-        }
+    pub fn closest_of(&self, rays: &RayPacket, kind: RayKinds) -> PacketHits {
+        let mut found = Found::none();
+        let is_packet =
+            rays.count() >= FEWEST && dispatch(self.arch, Closest { world: self, rays, kind, found: &mut found });
+        self.hits_of(rays, kind, is_packet.then_some(&found))
     }
 
-    /// The rays of a camera through film positions (pixels, and places in them), and the closest hits of the first of them.
+    /// The rays of a camera through the first `count` of some film positions (pixels, and places in them), of which the others are
+    /// to be the last of these, and their closest hits.
+    #[must_use]
     pub(super) fn closest_of_camera(
         &self,
         camera: &CameraRays,
         film: &[([i32; 2], [f32; 2]); LANES],
         count: usize,
-    ) -> (LaneRays, [Option<Hit>; LANES]) {
-        let rays = self.arch.dispatch(FromCamera { camera, film });
-        (rays, self.closest_of_lanes(&rays, count, RayKinds::CAMERA))
+    ) -> (RayPacket, PacketHits) {
+        let rays = self.arch.dispatch(FromCamera { camera, film, count });
+        let hits = self.closest_of(&rays, RayKinds::CAMERA);
+        (rays, hits)
     }
 
     /// What is in the way of at most [`LANES`] shadow rays, as [`Self::blocked`] finds it one by one. Those that have little in
     /// common are not looked at.
     #[must_use]
     pub fn blocked_of(&self, rays: &[ShadowRay], opaque: &impl Fn(MaterialId) -> bool) -> [Way; LANES] {
-        let mut ways = [Way::Unknown; LANES];
-        let starts: SmallVec<[RayStart; LANES]> = rays.iter().map(|ray| ray.start).collect();
-        if rays.len() < FEWEST || rays.windows(2).filter(|pair| pair[0].leaves != pair[1].leaves).count() > MOST_CHANGES
-        {
-            return ways;
-        }
-        let Some(packet) = LaneRays::of(&starts) else { return ways };
-        let mut reach = [DONE; LANES];
-        reach.iter_mut().zip(rays).for_each(|(reach, ray)| *reach = ray.reach);
-        let search = Blocked { world: self, rays: &packet, shadow: rays, opaque, reach };
-        if let Some(found) = dispatch(self.arch, search) {
-            ways = found;
-        }
-        ways
+        let mut ways = [Way::Clear; LANES];
+        let changes = rays.windows(2).filter(|pair| pair[0].leaves != pair[1].leaves).count();
+        let is_packet = rays.len() >= FEWEST && changes <= MOST_CHANGES && {
+            let packet = RayPacket::of(rays.iter().map(|ray| ray.start));
+            dispatch(self.arch, Blocked { world: self, rays: &packet, shadow: rays, opaque, ways: &mut ways })
+        };
+        if is_packet { ways } else { [Way::Unknown; LANES] }
     }
 
-    fn closest_of_lanes(&self, rays: &LaneRays, count: usize, kind: RayKinds) -> [Option<Hit>; LANES] {
+    /// The hits of rays, as a packet found them or, without one, one by one.
+    fn hits_of(&self, rays: &RayPacket, kind: RayKinds, found: Option<&Found>) -> PacketHits {
         let mut hits = [None; LANES];
-        let one = |lane: usize| {
-            let (origin, direction) = rays.ray_start(lane);
-            self.closest(&Ray::new(origin, direction), kind, f32::INFINITY)
-        };
-        let traced = (count >= FEWEST)
-            .then(|| dispatch(self.arch, Closest { world: self, rays, kind, found: Found::new(count) }))
-            .flatten();
-        match traced {
-            // Most packets of the background meet nothing at all.
-            Some(found) if found.object == [Found::NONE; LANES] => {}
-            Some(found) => {
-                for (lane, hit) in hits[..count].iter_mut().enumerate() {
-                    *hit = if found.crowded[lane] == 0 { found.hit(lane) } else { one(lane) };
+        // Most packets of the background meet nothing at all.
+        if found.is_some_and(|found| found.object == [Found::NONE; LANES]) {
+            return hits;
+        }
+        for (lane, hit) in hits[..rays.count()].iter_mut().enumerate() {
+            *hit = match found {
+                Some(found) if found.crowded[lane] == 0 => found.hit(lane),
+                _ => {
+                    let (origin, direction) = rays.ray_start(lane);
+                    self.closest(&Ray::new(origin, direction), kind, f32::INFINITY)
                 }
-            }
-            None => hits[..count].iter_mut().enumerate().for_each(|(lane, hit)| *hit = one(lane)),
+            };
         }
         hits
     }
 }
 
+/// The hits of a packet's rays.
+pub type PacketHits = [Option<Hit>; LANES];
+
 /// Makes the rays of a camera.
 struct FromCamera<'a> {
     camera: &'a CameraRays,
     film: &'a [([i32; 2], [f32; 2]); LANES],
+    count: usize,
 }
 
 impl pulp::WithSimd for FromCamera<'_> {
-    type Output = LaneRays;
+    type Output = RayPacket;
 
     #[inline(always)]
-    fn with_simd<S: pulp::Simd>(self, _: S) -> Self::Output {
-        let (origin, direction) = self.camera.rays(self.film);
-        LaneRays::new(origin, direction)
+    fn with_simd<S: pulp::Simd>(self, _: S) -> RayPacket {
+        RayPacket::of_camera(self.camera, self.film, self.count)
     }
 }
 
@@ -118,9 +113,10 @@ struct Found {
 impl Found {
     const NONE: u32 = u32::MAX;
 
-    fn new(rays: usize) -> Self {
-        let mut t = [DONE; LANES];
-        t[..rays].fill(f32::INFINITY);
+    /// No hits, of rays without reach.
+    #[inline(always)]
+    fn none() -> Self {
+        let t = [DONE; LANES];
         let none = [Self::NONE; LANES];
         let (u, v, side, crowded) = ([0.0; LANES], [0.0; LANES], [0; LANES], [0; LANES]);
         Self { t, reach: t, u, v, object: none, triangle: none, side, crowded }
@@ -180,19 +176,15 @@ trait Search {
     );
 }
 
-/// Shows each object that rays of a packet may meet to `search`. `None` if the rays are no packet.
+/// Shows each object that rays of a packet may meet to `search`. Returns whether the rays are a packet.
 #[inline(always)]
-fn each_object<E: Eights>(
-    eights: E,
-    world: &World,
-    rays: &LaneRays,
-    kind: RayKinds,
-    search: &mut impl Search,
-) -> Option<()> {
-    rays.shear()?;
+fn each_object<E: Eights>(eights: E, world: &World, rays: &LaneRays, kind: RayKinds, search: &mut impl Search) -> bool {
+    if rays.shear().is_none() {
+        return false;
+    }
     let mut farthest = largest(search.reach());
     world.tree.walk(eights, &rays.bundle(), &mut farthest, Objects { world, rays, kind, search });
-    Some(())
+    true
 }
 
 /// Looks at the objects of leaves.
@@ -223,11 +215,12 @@ impl<S: Search> Visitor for Objects<'_, S> {
     }
 }
 
+/// Looks for the nearest hits of a packet, which are none yet. Returns whether the rays are a packet.
 struct Closest<'a> {
     world: &'a World,
-    rays: &'a LaneRays,
+    rays: &'a RayPacket,
     kind: RayKinds,
-    found: Found,
+    found: &'a mut Found,
 }
 
 /// Looks for the nearest hits.
@@ -236,7 +229,7 @@ struct Nearest<'a> {
     culls: bool,
     /// The largest component of any ray's origin.
     farthest: f32,
-    found: Found,
+    found: &'a mut Found,
 }
 
 impl Search for Nearest<'_> {
@@ -256,7 +249,7 @@ impl Search for Nearest<'_> {
         reach: Lanes,
     ) {
         let size = placed.largest_start().max(object.grain(Vec3::splat(self.farthest)).max_element());
-        let (rays, culls, found) = (self.rays, self.culls, &mut self.found);
+        let (rays, culls, found) = (self.rays, self.culls, &mut *self.found);
         let mut search = InObject { found, id, object, rays, size, culls, near, reach };
         match placed.shear() {
             Some(shear) => intersect(eights, &object.tree, placed, &shear, &mut search),
@@ -309,15 +302,19 @@ impl Visit for InObject<'_> {
 }
 
 impl Task for Closest<'_> {
-    type Output = Option<Found>;
+    type Output = bool;
 
     #[inline(always)]
-    fn run<E: Eights>(self, eights: E) -> Self::Output {
+    fn run<E: Eights>(self, eights: E) -> bool {
         let Self { world, rays, kind, found } = self;
+        for (lane, (t, reach)) in found.t.iter_mut().zip(&mut found.reach).enumerate() {
+            *t = if lane < rays.count() { f32::INFINITY } else { DONE };
+            *reach = *t;
+        }
         let culls = kind != RayKinds::SHADOW;
-        let mut search = Nearest { rays, culls, farthest: rays.largest_start(), found };
-        each_object(eights, world, rays, kind, &mut search)?;
-        Some(search.found)
+        let rays = LaneRays::new(rays.origin, rays.direction);
+        let mut search = Nearest { rays: &rays, culls, farthest: rays.largest_start(), found };
+        each_object(eights, world, &rays, kind, &mut search)
     }
 }
 
@@ -343,12 +340,13 @@ pub enum Way {
     Unknown,
 }
 
+/// Looks for anything in the ways of a packet, which are clear so far. Returns whether the rays are a packet.
 struct Blocked<'a, O> {
     world: &'a World,
-    rays: &'a LaneRays,
+    rays: &'a RayPacket,
     shadow: &'a [ShadowRay],
     opaque: &'a O,
-    reach: Lanes,
+    ways: &'a mut [Way; LANES],
 }
 
 /// Looks for anything in the way.
@@ -360,7 +358,7 @@ struct Ways<'a, O> {
     farthest: f32,
     /// How far rays reach that nothing has blocked yet.
     reach: Lanes,
-    ways: [Way; LANES],
+    ways: &'a mut [Way; LANES],
 }
 
 impl<O: Fn(MaterialId) -> bool> Search for Ways<'_, O> {
@@ -435,14 +433,17 @@ impl<O: Fn(MaterialId) -> bool> Visit for AnyInObject<'_, '_, O> {
 }
 
 impl<O: Fn(MaterialId) -> bool> Task for Blocked<'_, O> {
-    type Output = Option<[Way; LANES]>;
+    type Output = bool;
 
     #[inline(always)]
-    fn run<E: Eights>(self, eights: E) -> Self::Output {
-        let Self { world, rays, shadow, opaque, reach } = self;
-        let farthest = rays.largest_start();
-        let mut search = Ways { rays, shadow, opaque, farthest, reach, ways: [Way::Clear; LANES] };
-        each_object(eights, world, rays, RayKinds::SHADOW, &mut search)?;
-        Some(search.ways)
+    fn run<E: Eights>(self, eights: E) -> bool {
+        let Self { world, rays, shadow, opaque, ways } = self;
+        let mut reach = [DONE; LANES];
+        for (reach, ray) in reach.iter_mut().zip(shadow) {
+            *reach = ray.reach;
+        }
+        let rays = LaneRays::new(rays.origin, rays.direction);
+        let mut search = Ways { rays: &rays, shadow, opaque, farthest: rays.largest_start(), reach, ways };
+        each_object(eights, world, &rays, RayKinds::SHADOW, &mut search)
     }
 }

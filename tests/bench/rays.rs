@@ -20,7 +20,7 @@ use tusche::scene::ids::ObjectId;
 use tusche::scene::settings::RayKinds;
 use tusche::scene::{Scene, file};
 use tusche::trace::World;
-use tusche::trace::packet::{LANES, RayStart};
+use tusche::trace::packet::{LANES, RayPacket, RayStart};
 use tusche::trace::surface::Surface;
 use tusche::trace::triangle::Ray;
 use tusche::trace::world::Facet;
@@ -32,7 +32,7 @@ const BLOCK: u32 = 4;
 /// CPU seconds of a pass.
 const PASS: f64 = 0.3;
 const PASSES: usize = 5;
-/// Rays that a thread takes at a time.
+/// Rays of a batch.
 const BATCH: usize = 4096;
 
 fn main() {
@@ -71,7 +71,13 @@ fn load(path: &Path, files: &FileStore) -> Scene {
 }
 
 /// Traces rays; how many of them meet something.
-type Trace = fn(&World, &[ShadowRay]) -> usize;
+/// Rays that a thread takes at a time, and the same as packets, which the renderer has number by number from the start.
+struct Batch {
+    rays: Vec<ShadowRay>,
+    packets: Vec<RayPacket>,
+}
+
+type Trace = fn(&World, &Batch) -> usize;
 
 fn measure(name: &str, scene: &Scene) {
     let transmissive = vec![false; scene.materials().len()];
@@ -103,27 +109,15 @@ fn measure(name: &str, scene: &Scene) {
         })
         .collect();
 
-    if let Ok(k) = std::env::var("ONLY") {
-        let (r, f): (_, Trace) = match &k[..] {
-            "bounce" => (&bounce, closest),
-            "shadow" => (&shadow, blocked),
-            _ => (&camera, closest),
-        };
-        let t = CpuClock::process();
-        let mut n = 0;
-        while t.seconds() < 4.0 {
-            n += f(&world, r);
-        }
-        println!("{n}");
-        return;
-    }
+    let rays_seen = camera.len();
+    let [camera, shadow, bounce] = [camera, shadow, bounce].map(batches);
     for threads in [1, std::thread::available_parallelism().map_or(1, usize::from)] {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads can be started");
-        let line = |kind: &str, rays: &[ShadowRay], single: Trace, packets: Option<Trace>| {
+        let line = |kind: &str, rays: &[Batch], single: Trace, packets: Option<Trace>| {
             let mut rates = [const { Vec::new() }; 3];
             for _ in 0..PASSES {
-                let single = rate(&pool, rays, &|rays| single(&world, rays));
-                let packets = packets.map_or(f64::NAN, |packets| rate(&pool, rays, &|rays| packets(&world, rays)));
+                let single = rate(&pool, rays, &|batch| single(&world, batch));
+                let packets = packets.map_or(f64::NAN, |packets| rate(&pool, rays, &|batch| packets(&world, batch)));
                 for (rates, rate) in rates.iter_mut().zip([single, packets, packets / single]) {
                     rates.push(rate);
                 }
@@ -143,8 +137,16 @@ fn measure(name: &str, scene: &Scene) {
         scene.triangle_count(),
         world.tree_bytes() as f64 * 1e-6,
         surfaces.len(),
-        camera.len(),
+        rays_seen,
     );
+}
+
+fn batches(rays: Vec<ShadowRay>) -> Vec<Batch> {
+    let batch = |rays: &[ShadowRay]| {
+        let packets = rays.chunks(LANES).map(|rays| RayPacket::of(rays.iter().map(|ray| ray.start))).collect();
+        Batch { rays: rays.to_vec(), packets }
+    };
+    rays.chunks(BATCH).map(batch).collect()
 }
 
 fn camera_rays(scene: &Scene) -> Vec<ShadowRay> {
@@ -191,31 +193,29 @@ fn single(ray: &ShadowRay) -> Ray {
     Ray::new(ray.start.0, ray.start.1)
 }
 
-fn closest(world: &World, rays: &[ShadowRay]) -> usize {
+fn closest(world: &World, Batch { rays, .. }: &Batch) -> usize {
     let closest = |ray: &ShadowRay| world.closest(&single(ray), RayKinds::CAMERA, f32::INFINITY);
     rays.iter().filter(|ray| closest(ray).is_some_and(|hit| hit.t > 0.0)).count()
 }
 
-fn closest_of(world: &World, rays: &[ShadowRay]) -> usize {
-    let meet = |rays: &[ShadowRay]| {
-        let mut starts = [(Vec3::ZERO, Vec3::ZERO); LANES];
-        starts.iter_mut().zip(rays).for_each(|(start, ray)| *start = ray.start);
-        let hits = world.closest_of(&starts[..rays.len()], RayKinds::CAMERA);
+fn closest_of(world: &World, Batch { packets, .. }: &Batch) -> usize {
+    let meet = |packet: &RayPacket| {
+        let hits = world.closest_of(packet, RayKinds::CAMERA);
         hits.iter().flatten().filter(|hit| hit.t > 0.0).count()
     };
-    rays.chunks(LANES).map(meet).sum()
+    packets.iter().map(meet).sum()
 }
 
 fn is_blocked(world: &World, ray: &ShadowRay) -> bool {
     world.blocked(&single(ray), ray.reach, Some(ray.leaves), |_| true, &mut Vec::new())
 }
 
-fn blocked(world: &World, rays: &[ShadowRay]) -> usize {
+fn blocked(world: &World, Batch { rays, .. }: &Batch) -> usize {
     rays.iter().filter(|ray| is_blocked(world, ray)).count()
 }
 
 /// As the renderer does it: what packets leave open is looked at one by one.
-fn blocked_of(world: &World, rays: &[ShadowRay]) -> usize {
+fn blocked_of(world: &World, Batch { rays, .. }: &Batch) -> usize {
     let count = |rays: &[ShadowRay]| {
         let ways = world.blocked_of(rays, &|_| true);
         let blocked = |(way, ray): &(Way, &ShadowRay)| match way {
@@ -229,13 +229,14 @@ fn blocked_of(world: &World, rays: &[ShadowRay]) -> usize {
 }
 
 /// Millions of rays a second in one pass.
-fn rate(pool: &rayon::ThreadPool, rays: &[ShadowRay], trace: &(dyn Fn(&[ShadowRay]) -> usize + Sync)) -> f64 {
+fn rate(pool: &rayon::ThreadPool, batches: &[Batch], trace: &(dyn Fn(&Batch) -> usize + Sync)) -> f64 {
     let threads = pool.current_num_threads() as f64;
+    let rays: usize = batches.iter().map(|batch| batch.rays.len()).sum();
     let clock = CpuClock::process();
     let mut traced = 0;
     while clock.seconds() < PASS * threads {
-        black_box(pool.install(|| rays.par_chunks(BATCH).with_max_len(1).map(trace).sum::<usize>()));
-        traced += rays.len();
+        black_box(pool.install(|| batches.par_iter().with_max_len(1).map(trace).sum::<usize>()));
+        traced += rays;
     }
     traced as f64 / (clock.seconds() / threads) * 1e-6
 }
