@@ -173,40 +173,46 @@ impl LaneRays {
         Ray { grain, ..Ray::new(self.start(lane), Vec3::from_array(lane_of(&self.direction, lane))) }
     }
 
+    /// The axis of the rays' largest components and whether these are negative; `None` if the rays are no packet.
+    #[inline(always)]
+    pub fn heading(&self) -> Option<(usize, bool)> {
+        const NEGATIVE: u32 = 4;
+        const UNSOUND: u32 = 8;
+        let ([ox, oy, oz], [dx, dy, dz]) = (&self.origin, &self.direction);
+        let mut headings = [0; LANES];
+        for i in 0..LANES {
+            // The axis and its order are those of `Ray::new`.
+            let [x, y, z] = [dx[i].abs(), dy[i].abs(), dz[i].abs()];
+            let is_x = (x > y) & (x > z);
+            let (axis, along) = if is_x {
+                (0, dx[i])
+            } else if y > z {
+                (1, dy[i])
+            } else {
+                (2, dz[i])
+            };
+            // 0 for finite numbers, else NaN.
+            let zero = (ox[i] * 0.0 + oy[i] * 0.0 + oz[i] * 0.0) + (x * 0.0 + y * 0.0 + z * 0.0);
+            headings[i] = axis | if along < 0.0 { NEGATIVE } else { 0 } | if zero == 0.0 { 0 } else { UNSOUND };
+        }
+        let first = headings[0];
+        let mut differ = 0;
+        for heading in headings {
+            differ |= heading ^ first;
+        }
+        (differ == 0 && first & UNSOUND == 0).then_some(((first & 3) as usize, first & NEGATIVE != 0))
+    }
+
     /// What the triangle test needs; `None` if the rays are no packet.
     #[inline(always)]
     pub fn shear(&self) -> Option<Shear> {
-        // The axis and its order are those of `Ray::new`.
-        let [dx, dy, dz] = &self.direction;
-        let (mut by_x, mut by_y, mut sound) = (0_u32, 0_u32, 0_u32);
-        for i in 0..LANES {
-            let [x, y, z] = [dx[i].abs(), dy[i].abs(), dz[i].abs()];
-            let is_x = (x > y) & (x > z);
-            by_x += u32::from(is_x);
-            by_y += u32::from(!is_x & (y > z));
-        }
-        for lanes in self.origin.iter().chain(&self.direction) {
-            for lane in lanes {
-                sound += u32::from(lane.abs() < f32::INFINITY);
-            }
-        }
-        let all = LANES as u32;
-        let z = match (by_x, by_y) {
-            (x, _) if x == all => 0,
-            (_, y) if y == all => 1,
-            (0, 0) => 2,
-            _ => return None,
-        };
-        let negative = self.direction[z].iter().map(|d| u32::from(*d < 0.0)).sum::<u32>();
-        if sound != 6 * all || (negative != 0 && negative != all) {
-            return None;
-        }
+        let (z, is_negative) = self.heading()?;
         let (mut x, mut y) = ((z + 1) % 3, (z + 2) % 3);
-        if negative != 0 {
+        if is_negative {
             std::mem::swap(&mut x, &mut y);
         }
         let mut shear = Shear { axes: [x, y, z], x: [0.0; LANES], y: [0.0; LANES], z: [0.0; LANES] };
-        let [along_x, along_y, along_z] = [x, y, z].map(|axis| &self.direction[axis]);
+        let (along_x, along_y, along_z) = (&self.direction[x], &self.direction[y], &self.direction[z.min(2)]);
         for i in 0..LANES {
             shear.x[i] = along_x[i] / along_z[i];
             shear.y[i] = along_y[i] / along_z[i];

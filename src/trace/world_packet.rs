@@ -23,10 +23,23 @@ impl World {
     /// same way.
     #[must_use]
     pub fn closest_of(&self, rays: &RayPacket, kind: RayKinds) -> PacketHits {
+        let mut hits = [None; LANES];
         let mut found = Found::none();
-        let is_packet =
-            rays.count() >= FEWEST && dispatch(self.arch, Closest { world: self, rays, kind, found: &mut found });
-        self.hits_of(rays, kind, is_packet.then_some(&found))
+        let task = Closest { world: self, rays, kind, found: &mut found };
+        let met = if rays.count() < FEWEST { None } else { dispatch(self.arch, task) };
+        // Most packets of the background meet nothing at all.
+        if met == Some(false) {
+            return hits;
+        }
+        for (lane, hit) in hits[..rays.count()].iter_mut().enumerate() {
+            *hit = if met.is_some() && found.crowded[lane] == 0 {
+                found.hit(lane)
+            } else {
+                let (origin, direction) = rays.ray_start(lane);
+                self.closest(&Ray::new(origin, direction), kind, f32::INFINITY)
+            };
+        }
+        hits
     }
 
     /// The rays of a camera through the first `count` of some film positions (pixels, and places in them), of which the others are
@@ -54,25 +67,6 @@ impl World {
             dispatch(self.arch, Blocked { world: self, rays: &packet, shadow: rays, opaque, ways: &mut ways })
         };
         if is_packet { ways } else { [Way::Unknown; LANES] }
-    }
-
-    /// The hits of rays, as a packet found them or, without one, one by one.
-    fn hits_of(&self, rays: &RayPacket, kind: RayKinds, found: Option<&Found>) -> PacketHits {
-        let mut hits = [None; LANES];
-        // Most packets of the background meet nothing at all.
-        if found.is_some_and(|found| found.object == [Found::NONE; LANES]) {
-            return hits;
-        }
-        for (lane, hit) in hits[..rays.count()].iter_mut().enumerate() {
-            *hit = match found {
-                Some(found) if found.crowded[lane] == 0 => found.hit(lane),
-                _ => {
-                    let (origin, direction) = rays.ray_start(lane);
-                    self.closest(&Ray::new(origin, direction), kind, f32::INFINITY)
-                }
-            };
-        }
-        hits
     }
 }
 
@@ -179,7 +173,7 @@ trait Search {
 /// Shows each object that rays of a packet may meet to `search`. Returns whether the rays are a packet.
 #[inline(always)]
 fn each_object<E: Eights>(eights: E, world: &World, rays: &LaneRays, kind: RayKinds, search: &mut impl Search) -> bool {
-    if rays.shear().is_none() {
+    if rays.heading().is_none() {
         return false;
     }
     let mut farthest = largest(search.reach());
@@ -215,7 +209,8 @@ impl<S: Search> Visitor for Objects<'_, S> {
     }
 }
 
-/// Looks for the nearest hits of a packet, which are none yet. Returns whether the rays are a packet.
+/// Looks for the nearest hits of a packet, which are none yet. Returns whether any ray meets anything; `None` if the rays are no
+/// packet.
 struct Closest<'a> {
     world: &'a World,
     rays: &'a RayPacket,
@@ -227,8 +222,6 @@ struct Closest<'a> {
 struct Nearest<'a> {
     rays: &'a LaneRays,
     culls: bool,
-    /// The largest component of any ray's origin.
-    farthest: f32,
     found: &'a mut Found,
 }
 
@@ -248,7 +241,7 @@ impl Search for Nearest<'_> {
         near: &Lanes,
         reach: Lanes,
     ) {
-        let size = placed.largest_start().max(object.grain(Vec3::splat(self.farthest)).max_element());
+        let size = placed.largest_start().max(object.grain(Vec3::splat(self.rays.largest_start())).max_element());
         let (rays, culls, found) = (self.rays, self.culls, &mut *self.found);
         let mut search = InObject { found, id, object, rays, size, culls, near, reach };
         match placed.shear() {
@@ -302,10 +295,10 @@ impl Visit for InObject<'_> {
 }
 
 impl Task for Closest<'_> {
-    type Output = bool;
+    type Output = Option<bool>;
 
     #[inline(always)]
-    fn run<E: Eights>(self, eights: E) -> bool {
+    fn run<E: Eights>(self, eights: E) -> Option<bool> {
         let Self { world, rays, kind, found } = self;
         for (lane, (t, reach)) in found.t.iter_mut().zip(&mut found.reach).enumerate() {
             *t = if lane < rays.count() { f32::INFINITY } else { DONE };
@@ -313,8 +306,16 @@ impl Task for Closest<'_> {
         }
         let culls = kind != RayKinds::SHADOW;
         let rays = LaneRays::new(rays.origin, rays.direction);
-        let mut search = Nearest { rays: &rays, culls, farthest: rays.largest_start(), found };
-        each_object(eights, world, &rays, kind, &mut search)
+        let mut search = Nearest { rays: &rays, culls, found };
+        let is_packet = each_object(eights, world, &rays, kind, &mut search);
+        is_packet.then(|| {
+            // Those that are met have lower numbers.
+            let mut least = Found::NONE;
+            for object in search.found.object {
+                least = least.min(object);
+            }
+            least != Found::NONE
+        })
     }
 }
 
@@ -354,8 +355,6 @@ struct Ways<'a, O> {
     rays: &'a LaneRays,
     shadow: &'a [ShadowRay],
     opaque: &'a O,
-    /// The largest component of any ray's origin.
-    farthest: f32,
     /// How far rays reach that nothing has blocked yet.
     reach: Lanes,
     ways: &'a mut [Way; LANES],
@@ -377,7 +376,7 @@ impl<O: Fn(MaterialId) -> bool> Search for Ways<'_, O> {
         _: &Lanes,
         reach: Lanes,
     ) {
-        let size = placed.largest_start().max(object.grain(Vec3::splat(self.farthest)).max_element());
+        let size = placed.largest_start().max(object.grain(Vec3::splat(self.rays.largest_start())).max_element());
         let mut search = AnyInObject { id, object, size, reach, found: self };
         match placed.shear() {
             Some(shear) => intersect(eights, &object.tree, placed, &shear, &mut search),
@@ -443,7 +442,7 @@ impl<O: Fn(MaterialId) -> bool> Task for Blocked<'_, O> {
             *reach = ray.reach;
         }
         let rays = LaneRays::new(rays.origin, rays.direction);
-        let mut search = Ways { rays: &rays, shadow, opaque, farthest: rays.largest_start(), reach, ways };
+        let mut search = Ways { rays: &rays, shadow, opaque, reach, ways };
         each_object(eights, world, &rays, RayKinds::SHADOW, &mut search)
     }
 }
