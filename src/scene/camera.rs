@@ -148,6 +148,28 @@ impl CameraRays {
         (Vec3::ZERO, direction.normalize().as_vec3())
     }
 
+    /// Bounds of the rays through all places of the pixels from `first` to `last` (both included, column and row): the least and the most of
+    /// their origins, then of their directions, which have any length here. As exact as single precision.
+    #[must_use]
+    pub fn bounds(&self, first: [i32; 2], last: [i32; 2]) -> [[Vec3; 2]; 2] {
+        let [width, height] = self.size;
+        let (shift, half) = (self.film_shift, self.half);
+        let across = |x: f64| (x - width / 2.0 + shift.x) / (height / 2.0) * half;
+        let up = |y: f64| -(y - height / 2.0 + shift.y) / (height / 2.0) * half;
+        let xs = [f64::from(first[0]), f64::from(last[0]) + 1.0].map(across);
+        let ys = [f64::from(first[1]), f64::from(last[1]) + 1.0].map(up);
+        let z = if self.is_orthographic { 0.0 } else { -1.0 };
+        // Linear in the place on the film, so that corners bound it.
+        let corners =
+            [[0, 0], [0, 1], [1, 0], [1, 1]].map(|[x, y]| self.world_from_camera * DVec3::new(xs[x], ys[y], z));
+        let bounds = [DVec3::min, DVec3::max].map(|of| corners.into_iter().reduce(of).unwrap_or_default().as_vec3());
+        if self.is_orthographic {
+            let direction = -self.world_from_camera.z_axis.as_vec3().normalize();
+            return [bounds, [direction; 2]];
+        }
+        [[Vec3::ZERO; 2], bounds]
+    }
+
     /// The rays through some film positions: x, y and z of their origins, then of their directions. Bit for bit those of
     /// [`Self::ray`], in loops that vectorise.
     #[inline(always)]

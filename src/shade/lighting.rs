@@ -121,6 +121,15 @@ impl Lighting {
         }
     }
 
+    /// Radiance of the background where that is the same in all directions.
+    #[must_use]
+    pub fn even_background(&self) -> Option<Vec3> {
+        match &self.background {
+            PlacedBackground::Color(color) => Some(*color),
+            PlacedBackground::Gradient { .. } | PlacedBackground::Image { .. } => None,
+        }
+    }
+
     /// Radiance of the background along a unit direction.
     #[must_use]
     pub fn background(&self, direction: Vec3) -> Vec3 {

@@ -283,6 +283,33 @@ pub(super) struct Bundle {
     mixed: [bool; 3],
 }
 
+impl Bundle {
+    /// Relative to an inverse: many times what the slab test of a ray rounds.
+    const SLACK: f32 = 1e-5;
+
+    /// Of all rays of any length whose origins and directions lie within bounds, the least and the most by axis.
+    pub fn within(origin: [Vec3; 2], direction: [Vec3; 2]) -> Self {
+        let mut bundle =
+            Self { near: [0, 1, 2], far: [3, 4, 5], origin: [[0.0; 2]; 3], inverse: [[0.0; 2]; 3], mixed: [false; 3] };
+        for axis in 0..3 {
+            let [low, high] = direction.map(|bound| bound[axis]);
+            // What is this small may be anything next to what it was rounded from.
+            if low < 1e-6 && high > -1e-6 {
+                bundle.mixed[axis] = true;
+                continue;
+            }
+            let [least, most] = [1.0 / high, 1.0 / low];
+            bundle.inverse[axis] = [least - least.abs() * Self::SLACK, most + most.abs() * Self::SLACK];
+            bundle.origin[axis] = [origin[1][axis], origin[0][axis]];
+            if most < 0.0 {
+                std::mem::swap(&mut bundle.near[axis], &mut bundle.far[axis]);
+                bundle.origin[axis].swap(0, 1);
+            }
+        }
+        bundle
+    }
+}
+
 impl<E: Eights> Slabs<E> for Bundle {
     #[inline(always)]
     fn distances(&self, e: E, planes: &[[f32; eight::WIDTH]; 6]) -> (E::Eight, E::Eight) {

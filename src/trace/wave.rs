@@ -8,6 +8,7 @@
 
 use std::ops::Range;
 
+use super::clear::Pixels;
 use super::cone::Cone;
 use super::media::Seen;
 use super::packet::{LANES, RayPacket};
@@ -185,14 +186,18 @@ impl<'a> TileTracer<'a> {
         let per_pixel = self.plan.layout.samples_per_pixel as usize;
         let run_samples = if self.plan.has_secondary_rays() { RUN_SAMPLES_BRANCHING } else { RUN_SAMPLES };
         let run_pixels = (run_samples / per_pixel).max(1);
-        let mut first = 0;
-        while first < rect.pixels() {
-            let run = first..(first + run_pixels).min(rect.pixels());
-            self.trace_run(rect, run.clone(), (&mut samples, &mut record), context, &mut work);
+        // A record has to know of every ray.
+        let may_be_clear = memory.known.is_none() && record.is_none();
+        for Pixels { places, are_clear } in self.runs(rect, run_pixels, may_be_clear) {
+            if are_clear {
+                work.rays.camera += (places.len() * per_pixel) as u64;
+                self.store_clear(rect, places, &mut samples);
+                continue;
+            }
+            self.trace_run(rect, places, (&mut samples, &mut record), context, &mut work);
             if memory.only_known && work.rays != RayCounts::default() {
                 break;
             }
-            first = run.end;
         }
         let samples = samples.finish();
         let record = record.map(TileRecord::finish);

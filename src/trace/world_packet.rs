@@ -51,9 +51,20 @@ impl World {
         film: &[([i32; 2], [f32; 2]); LANES],
         count: usize,
     ) -> (RayPacket, PacketHits) {
-        let rays = self.arch.dispatch(FromCamera { camera, film, count });
+        let rays = self.camera_packet(camera, film, count);
         let hits = self.closest_of(&rays, RayKinds::CAMERA);
         (rays, hits)
+    }
+
+    /// The same rays alone.
+    #[must_use]
+    pub(super) fn camera_packet(
+        &self,
+        camera: &CameraRays,
+        film: &[([i32; 2], [f32; 2]); LANES],
+        count: usize,
+    ) -> RayPacket {
+        self.arch.dispatch(FromCamera { camera, film, count })
     }
 
     /// What is in the way of at most [`LANES`] shadow rays, as [`Self::blocked`] finds it one by one. Those that have little in
