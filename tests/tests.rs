@@ -14,6 +14,7 @@ mod plan;
 mod shade;
 mod shader_check;
 // ... rays, lines and pixels, ...
+mod clear;
 mod film;
 mod footprint;
 mod light;

@@ -73,14 +73,15 @@ pub struct Seconds {
 #[allow(missing_docs, reason = "the names say it; see RayCounts")]
 pub struct Rays {
     pub camera: u64,
+    pub spared: u64,
     pub shadow: u64,
     pub reflection: u64,
     pub refraction: u64,
 }
 
 impl From<RayCounts> for Rays {
-    fn from(RayCounts { camera, shadow, reflection, refraction }: RayCounts) -> Self {
-        Self { camera, shadow, reflection, refraction }
+    fn from(RayCounts { camera, spared, shadow, reflection, refraction }: RayCounts) -> Self {
+        Self { camera, spared, shadow, reflection, refraction }
     }
 }
 

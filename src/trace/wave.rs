@@ -44,6 +44,8 @@ type Packet = [Option<Option<Hit>>; LANES];
 pub struct RayCounts {
     /// From the camera, continuations through invisible surfaces included.
     pub camera: u64,
+    /// Of these, the ones that were spared: they were known to meet nothing.
+    pub spared: u64,
     /// Towards lights.
     pub shadow: u64,
     /// Mirrored.
@@ -55,6 +57,7 @@ pub struct RayCounts {
 impl std::ops::AddAssign for RayCounts {
     fn add_assign(&mut self, other: Self) {
         self.camera += other.camera;
+        self.spared += other.spared;
         self.shadow += other.shadow;
         self.reflection += other.reflection;
         self.refraction += other.refraction;
@@ -190,7 +193,9 @@ impl<'a> TileTracer<'a> {
         let may_be_clear = memory.known.is_none() && record.is_none();
         for Pixels { places, are_clear } in self.runs(rect, run_pixels, may_be_clear) {
             if are_clear {
-                work.rays.camera += (places.len() * per_pixel) as u64;
+                let rays = (places.len() * per_pixel) as u64;
+                work.rays.camera += rays;
+                work.rays.spared += rays;
                 self.store_clear(rect, places, &mut samples);
                 continue;
             }
