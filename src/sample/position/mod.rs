@@ -12,12 +12,12 @@ use sobol::{BlueNoise, Sobol};
 use stratified::Stratified;
 
 /// Where samples lie: for each pixel, its [`PixelPositions`].
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct SamplePositions {
     kind: Kind,
 }
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 enum Kind {
     Stratified(Stratified),
     Sobol(Sobol),
@@ -40,8 +40,8 @@ impl SamplePositions {
     /// Those of one pixel.
     #[must_use]
     #[inline]
-    pub fn of_pixel(&self, pixel: [i32; 2]) -> PixelPositions {
-        PixelPositions(match self.kind {
+    pub fn of_pixel(&self, pixel: [i32; 2]) -> PixelPositions<'_> {
+        PixelPositions(match &self.kind {
             Kind::Stratified(positions) => InPixel::Stratified(positions.of_pixel(pixel)),
             Kind::Sobol(positions) => InPixel::Sobol(positions.of_pixel(pixel)),
             Kind::BlueNoise(positions) => InPixel::Sobol(positions.of_pixel(pixel)),
@@ -51,15 +51,15 @@ impl SamplePositions {
 
 /// Where the samples of one pixel lie.
 #[derive(Clone, Copy, Debug)]
-pub struct PixelPositions(InPixel);
+pub struct PixelPositions<'a>(InPixel<'a>);
 
 #[derive(Clone, Copy, Debug)]
-enum InPixel {
-    Stratified(stratified::OfPixel),
+enum InPixel<'a> {
+    Stratified(stratified::OfPixel<'a>),
     Sobol(sobol::OfPixel),
 }
 
-impl PixelPositions {
+impl PixelPositions<'_> {
     /// Offset of a sample inside the pixel, each component 0 … 1 (1 excluded).
     #[must_use]
     #[inline]
@@ -87,12 +87,15 @@ pub const fn gap_factor(sampler: Sampler) -> f32 {
 /// A 32-bit mix of three numbers, the same on every machine (the finaliser of PCG's RXS-M-XS family, chained).
 #[inline]
 fn mix(a: u32, b: u32, c: u32) -> u32 {
-    let step = |state: u32| {
-        let state = state.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
-        let word = ((state >> ((state >> 28) + 4)) ^ state).wrapping_mul(277_803_737);
-        (word >> 22) ^ word
-    };
     step(a ^ step(b ^ step(c)))
+}
+
+/// A 32-bit mix of one number.
+#[inline]
+fn step(state: u32) -> u32 {
+    let state = state.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
+    let word = ((state >> ((state >> 28) + 4)) ^ state).wrapping_mul(277_803_737);
+    (word >> 22) ^ word
 }
 
 /// A number in 0 … 1 (1 excluded) from the upper 24 bits.
