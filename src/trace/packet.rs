@@ -1,6 +1,6 @@
 //! Packets: rays that go much the same way, sixteen at a time.
 //!
-//! A packet goes down a hierarchy as one: its `Bundle` bounds the slab distances of all its rays, and four boxes are tested
+//! A packet goes down a hierarchy as one: its `Bundle` bounds the slab distances of all its rays, and eight boxes are tested
 //! with it at once. Only at the leaves is each ray asked whether it enters, and then meets each triangle, with the
 //! operations of the single ray in their order, in loops over lanes that the compiler vectorises for the instructions that
 //! [`pulp::Arch`] finds at run time. See the head of `tree` for why it finds the same bits.
