@@ -7,9 +7,9 @@
 use std::ops::Range;
 
 use super::eight::{Eights, Task, dispatch};
-use super::packet::{Bundle, LANES};
+use super::packet::Bundle;
 use super::tree::{Leaf, Visitor};
-use super::wave::TileTracer;
+use super::wave::{FilmPlaces, TileTracer};
 use super::world::World;
 use crate::math::Vec3;
 use crate::sample::{Node, NodePath, PixelRect, SampleBufferBuilder, SampleColor};
@@ -93,25 +93,12 @@ impl TileTracer<'_> {
         let alpha = if self.transparent { 0.0 } else { 1.0 };
         let extras = vec![[0.0; 3]; layout.aovs];
         let mut places = self.film_places(rect, pixels.clone());
-        loop {
-            let (mut numbers, mut film) = ([0; LANES], [([0; 2], [0.0; 2]); LANES]);
-            let mut count = 0;
-            for (sample, pixel, offset) in places.by_ref().take(LANES) {
-                numbers[count] = sample;
-                film[count] = (pixel, offset);
-                count += 1;
-            }
-            if count == 0 {
-                break;
-            }
-            let last = film[count - 1];
-            film[count..].fill(last);
-            let directions = even.is_none().then(|| self.world.camera_packet(&self.rays, &film, count));
+        while let Some(FilmPlaces { samples: numbers, film, count }) = FilmPlaces::next(&mut places) {
+            // Only an uneven background asks where rays go.
+            let rays = even.is_none().then(|| self.world.camera_packet(&self.rays, &film, count));
             for lane in 0..count {
-                let radiance = match (&even, &directions) {
-                    (None, Some(rays)) => self.lighting.background(rays.ray_start(lane).1),
-                    (even, _) => even.unwrap_or_default(),
-                };
+                let towards = rays.as_ref().map_or(Vec3::ZERO, |rays| rays.ray_start(lane).1);
+                let radiance = even.unwrap_or_else(|| self.lighting.background(towards));
                 let sample = numbers[lane];
                 samples.set_sample(sample, film[lane].1, SampleColor { color: radiance.to_array(), alpha }, 0);
                 if layout.position || layout.aovs > 0 {

@@ -64,6 +64,33 @@ impl std::ops::AddAssign for RayCounts {
     }
 }
 
+/// Places of samples on the film, a packet at a time.
+pub(super) struct FilmPlaces {
+    /// Numbers of the samples in the tile.
+    pub samples: [u32; LANES],
+    /// Pixels and places in them. Behind the last, it is repeated.
+    pub film: [([i32; 2], [f32; 2]); LANES],
+    /// How many there are, at least 1.
+    pub count: usize,
+}
+
+impl FilmPlaces {
+    /// Those that come next, if any do.
+    #[inline]
+    pub fn next(places: &mut impl Iterator<Item = (u32, [i32; 2], [f32; 2])>) -> Option<Self> {
+        let (mut samples, mut film) = ([0; LANES], [([0; 2], [0.0; 2]); LANES]);
+        let mut count = 0;
+        for (sample, pixel, offset) in places.take(LANES) {
+            samples[count] = sample;
+            film[count] = (pixel, offset);
+            count += 1;
+        }
+        let last = film[count.checked_sub(1)?];
+        film[count..].fill(last);
+        Some(Self { samples, film, count })
+    }
+}
+
 /// What a tile of rays came to.
 #[derive(Debug)]
 pub struct TracedTile {
@@ -312,19 +339,7 @@ impl<'a> TileTracer<'a> {
     ) {
         let mut places = self.film_places(rect, pixels);
         let mut hits = std::mem::take(&mut context.wave_hits);
-        loop {
-            let (mut samples, mut film) = ([0; LANES], [([0; 2], [0.0; 2]); LANES]);
-            let mut count = 0;
-            for (sample, pixel, offset) in places.by_ref().take(LANES) {
-                samples[count] = sample;
-                film[count] = (pixel, offset);
-                count += 1;
-            }
-            if count == 0 {
-                break;
-            }
-            let last = film[count - 1];
-            film[count..].fill(last);
+        while let Some(FilmPlaces { samples, film, count }) = FilmPlaces::next(&mut places) {
             let (rays, met) = self.world.closest_of_camera(&self.rays, &film, count);
             work.rays.camera += count as u64;
             for lane in 0..count {
