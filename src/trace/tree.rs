@@ -230,7 +230,8 @@ impl BoxTree {
         if self.nodes.is_empty() {
             return;
         }
-        let mut stack = Stack::new();
+        // Postponed children: on the stack for the depths that rays go to, on the heap beyond.
+        let mut stack: SmallVec<[u64; 48]> = SmallVec::new();
         let mut at = 0;
         loop {
             let node = &self.nodes[at];
@@ -334,41 +335,4 @@ fn merge(pairs: &[Bvh2Node]) -> Vec<Node> {
         }
     }
     nodes
-}
-
-/// Postponed children: on the stack for the depths that rays go to, on the heap beyond. Clearing it is part of the cost of
-/// every ray, so it is no larger than needed.
-struct Stack {
-    inline: [u64; Self::INLINE],
-    length: usize,
-    beyond: Vec<u64>,
-}
-
-impl Stack {
-    const INLINE: usize = 48;
-
-    #[inline(always)]
-    fn new() -> Self {
-        Self { inline: [0; Self::INLINE], length: 0, beyond: Vec::new() }
-    }
-
-    #[inline(always)]
-    fn push(&mut self, key: u64) {
-        match self.inline.get_mut(self.length) {
-            Some(place) => {
-                *place = key;
-                self.length += 1;
-            }
-            None => self.beyond.push(key),
-        }
-    }
-
-    #[inline(always)]
-    fn pop(&mut self) -> Option<u64> {
-        if let Some(key) = self.beyond.pop() {
-            return Some(key);
-        }
-        self.length = self.length.checked_sub(1)?;
-        Some(self.inline[self.length])
-    }
 }
