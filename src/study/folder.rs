@@ -27,6 +27,7 @@ struct ReferenceNote {
     flip: [Option<f64>; 4],
     coverage: Option<f64>,
     position: Option<f64>,
+    crossings: Option<f64>,
 }
 
 impl Folder {
@@ -35,8 +36,8 @@ impl Folder {
     /// # Errors
     /// If it cannot be made or written to.
     pub fn open(path: &Path) -> Result<Self, Diagnostic> {
-        let pictures = path.join("pictures");
-        for folder in [path, &pictures] {
+        let [pictures, plots] = ["pictures", "plots"].map(|name| path.join(name));
+        for folder in [path, &pictures, &plots] {
             match std::fs::create_dir(folder) {
                 Err(error) if error.kind() != std::io::ErrorKind::AlreadyExists => {
                     return Err(Diagnostic::error(format!("cannot make this folder: {error}")).in_file(folder));
@@ -66,6 +67,12 @@ impl Folder {
     #[must_use]
     pub fn file(&self, name: &str) -> PathBuf {
         self.path.join(name)
+    }
+
+    /// A plot of this name.
+    #[must_use]
+    pub fn plot(&self, name: &str) -> PathBuf {
+        self.path.join("plots").join(format!("{name}.svg"))
     }
 
     /// The picture of a point, or `reference`.
@@ -113,8 +120,8 @@ impl Folder {
             reflections: parts[2],
             rest: parts[3],
         };
-        let ReferenceNote { rmse, flip, coverage, position, .. } = note;
-        Some((shot, note.samples, Errors { rmse: region(rmse), flip: region(flip), coverage, position }))
+        let ReferenceNote { rmse, flip, coverage, position, crossings, .. } = note;
+        Some((shot, note.samples, Errors { rmse: region(rmse), flip: region(flip), coverage, crossings, position }))
     }
 
     /// Keeps a reference, in full precision.
@@ -150,6 +157,7 @@ impl Folder {
             flip: own.flip.parts(),
             coverage: own.coverage,
             position: own.position,
+            crossings: own.crossings,
         };
         let text = serde_json::to_string_pretty(&note)
             .map_err(|error| Diagnostic::error(format!("cannot write the reference: {error}")).in_file(&note_path))?;

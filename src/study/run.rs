@@ -380,7 +380,7 @@ impl Camera<'_> {
             return Err(fault.hint(hint).into());
         }
         shot.coverage.clone_from(&truth.coverage);
-        Ok(Some((shot, Errors { coverage: None, position: None, ..own })))
+        Ok(Some((shot, Errors { coverage: None, crossings: None, position: None, ..own })))
     }
 
     /// Seeds that nobody chooses, so that no pattern is used for two purposes.
