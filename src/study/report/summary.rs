@@ -235,11 +235,14 @@ impl Summary {
         Sampler::ALL.into_iter().map(|sampler| (sampler, fitted(&of(sampler), study, measure))).collect()
     }
 
-    /// The points of a method on its ladder, by rising time.
+    /// The points of a method, by rising time: those of its ladder, and of the ladder of samples, which is that of the exact search, too.
     #[must_use]
     pub fn of_method(&self, study: &Study, method: Method) -> Vec<&Point> {
         let mut points = self.of_knob(study, Knob::Method);
+        points.extend(self.of_knob(study, Knob::Samples));
         points.retain(|point| point.settings.method == method);
+        points.sort_by_key(|point| point.index);
+        points.dedup_by_key(|point| point.index);
         points.sort_by(|a, b| a.cpu.median.total_cmp(&b.cpu.median));
         points
     }
