@@ -253,7 +253,8 @@ fn a_quality_is_a_number_of_samples_that_can_be_explained() {
     let explained = |flags: &[&str]| place.run(&[&["explain", "scene.toml"], flags].concat()).exits(0).stdout();
     let plan = explained(&["--quality", "final"]);
     assert!(
-        plan.contains("64 samples per pixel\n") && plan.contains("final: 64 samples per pixel, sampler sobol, where the scene says 4 and stratified"),
+        plan.contains("64 samples per pixel\n")
+            && plan.contains("final: 64 samples per pixel, sampler sobol, where the scene says 4 and stratified"),
         "{plan}"
     );
     assert!(plan.contains("times the time of draft") && plan.contains("of the lines' area wrong"), "{plan}");

@@ -183,7 +183,8 @@ impl Reference {
             flip: ByRegion::of(regions, |i| f64::from(flip[i]), |mean| mean),
             coverage: has_ink.then(|| wrong_share(&reference.coverage, &test.coverage)),
             crossings: (!self.crossings.is_empty()).then(|| {
-                let [reference, test] = [&reference.coverage, &test.coverage].map(|ink| self.crossings.iter().map(|i| ink[*i]));
+                let [reference, test] =
+                    [&reference.coverage, &test.coverage].map(|ink| self.crossings.iter().map(|i| ink[*i]));
                 wrong_share(&reference.collect::<Vec<_>>(), &test.collect::<Vec<_>>())
             }),
             position: self.position(&test.coverage),

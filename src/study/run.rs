@@ -145,13 +145,15 @@ pub fn study(
     let measures_widths = options.widths && camera.truth.is_some();
     let mut work = Work { control, end: if measures_widths { 0.9 } else { 1.0 }, done: 0.0, all: 0.0 };
     let waiting = |runs: &[Run]| {
-        let all = (0..options.repeats.max(1)).flat_map(|repeat| ladder.order().into_iter().map(move |point| (point, repeat)));
+        let all =
+            (0..options.repeats.max(1)).flat_map(|repeat| ladder.order().into_iter().map(move |point| (point, repeat)));
         let is_missing = |(point, repeat): &(usize, u32)| {
             !runs.iter().any(|run| run.repeat == *repeat && run.is_of(&ladder.points[*point]))
         };
         all.filter(is_missing).collect::<Vec<_>>()
     };
-    let samples_of = |waiting: &[(usize, u32)]| waiting.iter().map(|(point, _)| ladder.points[*point].samples).sum::<u32>();
+    let samples_of =
+        |waiting: &[(usize, u32)]| waiting.iter().map(|(point, _)| ladder.points[*point].samples).sum::<u32>();
 
     // The scene's own picture tells what all others will take.
     let mut first = None;

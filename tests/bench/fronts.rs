@@ -1,6 +1,6 @@
 //! Whether `--quality` chooses points on the front: `cargo bench --bench fronts -- [--write] [--keep=DIR] [SCENE...]`.
 //!
-//! Studies every shipped scene (or those named), 128 px wide, with all knobs that matter to it, and tells for each preset what it
+//! Studies every shipped scene (or those named), 112 px wide, with all knobs that matter to it, and tells for each preset what it
 //! costs, how far it is from the reference, and how far it lies behind the front of accuracy against CPU time: the largest factor
 //! by which another point of the study is both faster and more accurate, over all four measures of error. `--write` writes
 //! `src/study/fronts.csv`, from which `tusche explain --quality` takes its figures. It takes minutes, and is best done on a
@@ -18,7 +18,9 @@ use tusche::study::report::{
 };
 use tusche::study::{StudyControl, StudyOptions, study};
 
-const WIDTH: u32 = 128;
+const WIDTH: u32 = 112;
+/// Samples per pixel of the reference: over six times those of the last preset.
+const REFERENCE: u32 = 400;
 /// More than this behind the front is a defect of the presets.
 const ALLOWED: f64 = 1.10;
 
@@ -71,7 +73,13 @@ fn measure(path: &Path, folder: &Path, table: &mut String) -> f64 {
     let scene = builder.build().unwrap_or_else(|faults| panic!("{faults}"));
     let (shaders, _) = Shaders::compile(&scene, &Host::new()).unwrap_or_else(|faults| panic!("{faults}"));
     let folder = folder.join(&name);
-    let options = StudyOptions { title: name.clone(), reference: 576, threads: 1, widths: false, ..StudyOptions::default() };
+    let options = StudyOptions {
+        title: name.clone(),
+        reference: REFERENCE,
+        threads: 1,
+        widths: false,
+        ..StudyOptions::default()
+    };
     let found = study(scene, &shaders, &folder, &options, &StudyControl::default())
         .unwrap_or_else(|faults| panic!("{name}: {faults}"));
     report::write(&found, &folder).unwrap_or_else(|fault| panic!("{name}: {fault}"));

@@ -111,13 +111,14 @@ fn a_study_writes_a_table_numbers_pictures_and_a_page() {
     assert_eq!((&fit["knob"], &fit["error"]), (&"samples".into(), &"line_coverage".into()));
     let slope = fit["exponent"]["by_samples"].as_f64().expect("a slope is fitted");
     assert!((-1.0..-0.4).contains(&slope), "{slope}");
-    let is_bauer =
-        |point: &&Value| point["settings"]["samples"] == 4 && point["settings"]["method"] == "bauer";
+    let is_bauer = |point: &&Value| point["settings"]["samples"] == 4 && point["settings"]["method"] == "bauer";
     let bauer = points.iter().find(is_bauer).expect("bauer was tried");
     let bauer = bauer["errors"]["line_coverage"]["mean"].as_f64().expect("there are lines");
     assert!(bauer > coverage(4), "the exact search is nearer to the truth: {bauer} {}", coverage(4));
     // A square has corners.
-    assert!(points.iter().all(|point| point["errors"]["line_crossings"]["mean"].as_f64().is_some_and(|error| error > 0.0)));
+    assert!(
+        points.iter().all(|point| point["errors"]["line_crossings"]["mean"].as_f64().is_some_and(|error| error > 0.0))
+    );
     for time in found["methods_in_equal_time"].as_array().expect("methods are compared") {
         for errors in [&time["errors"]["line_coverage"], &time["errors"]["line_crossings"]] {
             let of = |method: &str| errors[method].as_f64();

@@ -35,8 +35,8 @@ pub(super) fn section(study: &Study, summary: &Summary, figures: &mut Figures) -
 fn plot<'a>(study: &Study, summary: &Summary, measure: &'a Measure) -> Plot<'a> {
     let series = METHODS.into_iter().enumerate().map(|(kind, method)| {
         let points = summary.of_method(study, method).into_iter();
-        let dots = points
-            .filter_map(|point| dot(point, measure, point.cpu.median, Some(point.settings.samples.to_string())));
+        let dots =
+            points.filter_map(|point| dot(point, measure, point.cpu.median, Some(point.settings.samples.to_string())));
         Series { kind, name: method_name(method).to_owned(), dots: dots.collect(), joined: true, faint: false }
     });
     Plot {
@@ -69,7 +69,11 @@ fn table(study: &Study, summary: &Summary) -> String {
     for time in times {
         let _ = write!(html, "<tr><td>{}</td><td>{}</td>", time.samples, number(time.seconds));
         for error in time.errors.iter().flatten() {
-            let _ = write!(html, "<td>{}</td>", error.map_or_else(|| "–".to_owned(), |error| format!("{} %", number(100.0 * error))));
+            let _ = write!(
+                html,
+                "<td>{}</td>",
+                error.map_or_else(|| "–".to_owned(), |error| format!("{} %", number(100.0 * error)))
+            );
         }
         html.push_str("</tr>\n");
     }

@@ -67,10 +67,15 @@ pub fn json(study: &Study, summary: &Summary) -> Value {
     });
     let methods = summary.equal_times(study, &methods::COMPARED).into_iter().map(|time| {
         let of_methods = |errors: &[Option<f64>; METHODS.len()]| {
-            METHODS.iter().zip(errors).map(|(method, error)| (method_name(*method).to_owned(), json!(error))).collect::<Map<_, _>>()
+            METHODS
+                .iter()
+                .zip(errors)
+                .map(|(method, error)| (method_name(*method).to_owned(), json!(error)))
+                .collect::<Map<_, _>>()
         };
         let errors = methods::COMPARED.iter().zip(&time.errors);
-        let errors: Map<_, _> = errors.map(|(measure, errors)| (measure.name.to_owned(), of_methods(errors).into())).collect();
+        let errors: Map<_, _> =
+            errors.map(|(measure, errors)| (measure.name.to_owned(), of_methods(errors).into())).collect();
         json!({ "samples_of_exact": time.samples, "cpu_seconds": time.seconds, "errors": errors })
     });
     let threads = study.runs.iter().flatten().next().map(|run| run.threads);

@@ -220,9 +220,11 @@ fn costs(study: &Study, summary: &Summary) -> String {
          other plots are without it.</p>\n<ul class=\"legend\">{stages}</ul>\n<div class=\"two\">\n{}</div>\n\
          <h2>Memory</h2>\n<div class=\"two\">\n{}{}</div>\n",
         figures("CPU seconds", "s", &|point| Some(point.stages.to_vec())),
-        figures("Bytes that a sample takes while its tile is in memory, with what the line search prepares", "B", &|point| {
-            Some(vec![0.0, point.bytes_per_sample])
-        }),
+        figures(
+            "Bytes that a sample takes while its tile is in memory, with what the line search prepares",
+            "B",
+            &|point| { Some(vec![0.0, point.bytes_per_sample]) }
+        ),
         figures("Most memory that the process held, scene and reference included", "MiB", &|point| {
             Some(vec![0.0, 0.0, point.peak? / f64::from(1 << 20)])
         }),

@@ -13,9 +13,10 @@ pub(super) fn section(study: &Study, summary: &Summary, figures: &mut Figures) -
     if points.is_empty() {
         return String::new();
     }
-    let mut html = "<h2>Samplers</h2>\n<p>The same errors by how samples are spread over the pixels, against samples per pixel. \
+    let mut html =
+        "<h2>Samplers</h2>\n<p>The same errors by how samples are spread over the pixels, against samples per pixel. \
                     Dashed: the ideal N<sup>−0.75</sup>.</p>\n"
-        .to_owned();
+            .to_owned();
     html += &legend(Sampler::ALL.into_iter().map(|sampler| sampler.name().to_owned()).enumerate());
     html.push_str("<div class=\"two\">\n");
     let counts = points.iter().map(|point| f64::from(point.settings.samples));

@@ -355,7 +355,9 @@ mod tests {
         assert_eq!(Mean::of(&[1.0, 3.0]), Some(Mean { mean: 2.0, deviation: 2.0_f64.sqrt() }));
         let points = [[1.0, 8.0], [4.0, 2.0], [16.0, 1.0]];
         let found = [0.5, 1.0, 2.0, 4.0, 8.0, 17.0].map(|x| between(&points, x));
-        for (found, expected) in found.into_iter().zip([None, Some(8.0), Some(4.0), Some(2.0), Some(2.0_f64.sqrt()), None]) {
+        for (found, expected) in
+            found.into_iter().zip([None, Some(8.0), Some(4.0), Some(2.0), Some(2.0_f64.sqrt()), None])
+        {
             assert_eq!(found.is_some(), expected.is_some());
             assert!((found.unwrap_or_default() - expected.unwrap_or_default()).abs() < 1e-12, "{found:?}");
         }
