@@ -1,6 +1,6 @@
 //! Whether `--quality` chooses points on the front: `cargo bench --bench fronts -- [--write] [--keep=DIR] [SCENE...]`.
 //!
-//! Studies every shipped scene (or those named), 112 px wide, with all knobs that matter to it, and tells for each preset what it
+//! Studies every shipped scene (or those named), 112 px wide, with all knobs that matter to it but the line method, and tells for each preset what it
 //! costs, how far it is from the reference, and how far it lies behind the front of accuracy against CPU time: the largest factor
 //! by which another point of the study is both faster and more accurate, over all four measures of error. `--write` writes
 //! `src/study/fronts.csv`, from which `tusche explain --quality` takes its figures. It takes minutes, and is best done on a
@@ -16,7 +16,7 @@ use tusche::study::report::{
     self,
     summary::{MEASURES, Summary},
 };
-use tusche::study::{StudyControl, StudyOptions, study};
+use tusche::study::{Knob, StudyControl, StudyOptions, study};
 
 const WIDTH: u32 = 112;
 /// Samples per pixel of the reference: over six times those of the last preset.
@@ -73,8 +73,11 @@ fn measure(path: &Path, folder: &Path, table: &mut String) -> f64 {
     let scene = builder.build().unwrap_or_else(|faults| panic!("{faults}"));
     let (shaders, _) = Shaders::compile(&scene, &Host::new()).unwrap_or_else(|faults| panic!("{faults}"));
     let folder = folder.join(&name);
+    // Older methods take several times as long for more error; see README.
+    let knobs = Knob::ALL.into_iter().filter(|knob| *knob != Knob::Method).collect();
     let options = StudyOptions {
         title: name.clone(),
+        knobs,
         reference: REFERENCE,
         threads: 1,
         widths: false,

@@ -46,9 +46,9 @@ pub(super) fn section(study: &Study, summary: &Summary, figures: &mut Figures) -
             floor: (measure.of)(&study.own).filter(|floor| *floor > 0.0),
             least: None,
         };
-        let fits = summary.sampler_fits(study, measure).into_iter().filter_map(|(sampler, fit)| {
-            let fit = fit?;
-            Some(format!("{}: N<sup>{:.2}</sup>", sampler.name(), fit.by_samples))
+        let fits = summary.sampler_fits(study, measure).into_iter().map(|(sampler, fit)| match fit {
+            Some(fit) => format!("{}: N<sup>{:.2}</sup> over {} points", sampler.name(), fit.by_samples, fit.points),
+            None => format!("{}: too few points above the reference's own error for a slope", sampler.name()),
         });
         let caption: Vec<_> = std::iter::once(format!("<b>{}</b>", measure.title)).chain(fits).collect();
         html += &figures.add(format!("samplers_{}", measure.name), &plot, &caption.join(" · "));

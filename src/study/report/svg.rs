@@ -170,15 +170,23 @@ impl Plot<'_> {
         format!(
             "<svg xmlns=\"http://www.w3.org/2000/svg\" style=\"width:{WIDTH}px;height:{height}px\" viewBox=\"0 0 {WIDTH} {height}\">\n\
              <style>\n{}</style>\n<rect width=\"100%\" height=\"100%\" fill=\"var(--page)\"/>\n{legend}\n\
-             <svg y=\"{top}\" style=\"height:{HEIGHT}px\"{}\n</svg>\n",
+             <g transform=\"translate(0 {top})\">\n{}</g>\n</svg>\n",
             include_str!("style.css"),
-            self.svg().trim_start_matches("<svg")
+            self.body()
         )
     }
 
     /// The plot as an `svg` element.
     #[must_use]
     pub fn svg(&self) -> String {
+        format!(
+            "<svg class=\"plot\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\" aria-label=\"{}\">\n{}</svg>",
+            escape(self.title),
+            self.body()
+        )
+    }
+
+    fn body(&self) -> String {
         let dots = || self.series.iter().flat_map(|series| &series.dots);
         let x = Axis::new(dots().map(|dot| dot.at[0]), LEFT, WIDTH - RIGHT);
         // A floor far below all dots is not worth the room.
@@ -187,10 +195,7 @@ impl Plot<'_> {
         let lowest = self.least.unwrap_or(0.0);
         let shown = dots().flat_map(|dot| [dot.at[1], dot.reach[1]]).chain(floor).map(|value| value.max(lowest));
         let y = Axis::new(shown, HEIGHT - BOTTOM, TOP);
-        let mut svg = format!(
-            "<svg class=\"plot\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\" aria-label=\"{}\">\n",
-            escape(self.title)
-        );
+        let mut svg = String::new();
         let mut put = |text: String| {
             svg.push_str(&text);
             svg.push('\n');
@@ -301,7 +306,7 @@ impl Plot<'_> {
                 }
             }
         }
-        svg + "</svg>"
+        svg
     }
 }
 
