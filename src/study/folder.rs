@@ -39,10 +39,16 @@ impl Folder {
         let [pictures, plots] = ["pictures", "plots"].map(|name| path.join(name));
         for folder in [path, &pictures, &plots] {
             match std::fs::create_dir(folder) {
-                Err(error) if error.kind() != std::io::ErrorKind::AlreadyExists => {
+                Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => {
+                    if !folder.is_dir() {
+                        let fault = Diagnostic::error("a study writes to a folder, and this is a file").in_file(folder);
+                        return Err(fault.hint("name another folder"));
+                    }
+                }
+                Err(error) => {
                     return Err(Diagnostic::error(format!("cannot make this folder: {error}")).in_file(folder));
                 }
-                _ => {}
+                Ok(()) => {}
             }
         }
         let folder = Self { path: path.to_owned() };

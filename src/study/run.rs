@@ -143,7 +143,8 @@ pub fn study(
 
     // Drawn widths come last.
     let measures_widths = options.widths && camera.truth.is_some();
-    let mut work = Work { control, end: if measures_widths { 0.9 } else { 1.0 }, done: 0.0, all: 0.0 };
+    let end = if measures_widths { 0.9 } else { 1.0 };
+    let mut work = Work { control, start, budget: options.budget, end, done: 0.0, all: 0.0 };
     let waiting = |runs: &[Run]| {
         let all =
             (0..options.repeats.max(1)).flat_map(|repeat| ladder.order().into_iter().map(move |point| (point, repeat)));
@@ -241,6 +242,8 @@ pub fn study(
 /// How far a study is, in samples per pixel.
 struct Work<'a> {
     control: &'a StudyControl<'a>,
+    start: Instant,
+    budget: Option<Duration>,
     done: f64,
     all: f64,
     /// The share of the whole study at which all pictures are taken.
@@ -252,8 +255,14 @@ impl<'a> Work<'a> {
     fn of<'b>(&self, what: &'b str, samples: u32) -> impl Fn(f64) + Sync + use<'a, 'b> {
         let (control, scale) = (self.control, self.end / self.all.max(1.0));
         let (done, samples) = (self.done * scale, f64::from(samples) * scale);
-        control.say(done, what);
-        move |share| control.say(done + share * samples, what)
+        let (start, budget) = (self.start, self.budget);
+        // Whichever ends it first: all is done, or the budget is used up.
+        let say = move |share: f64| {
+            let used = budget.map_or(0.0, |budget| start.elapsed().as_secs_f64() / budget.as_secs_f64().max(1e-9));
+            control.say((done + share * samples).max(used.min(1.0)), what);
+        };
+        say(0.0);
+        say
     }
 }
 
@@ -316,7 +325,7 @@ pub fn reference_samples(options: &StudyOptions, own: u32, per_sample: f64) -> R
     }
     let needed = (f64::from(least) * per_sample / 0.4).max(0.1);
     let fault = Diagnostic::error(format!(
-        "a budget of {:.1} s is too small: the reference needs {:.1} s even with only {least} samples",
+        "a budget of {} s is too small: the reference needs {:.1} s even with only {least} samples",
         budget.as_secs_f64(),
         f64::from(least) * per_sample
     ));
