@@ -30,8 +30,8 @@ pub type Error = fn(&Errors) -> Option<f64>;
 /// The coverage error where lines meet: not of all pictures, and so none of [`MEASURES`].
 pub const CROSSINGS: Measure = Measure {
     name: "line_crossings",
-    title: "Line coverage error where lines meet",
-    unit: "share of the lines' area there",
+    title: "Coverage error where lines meet",
+    unit: "share of their area",
     ideal: Some(-0.75),
     of: |errors| errors.crossings,
 };
