@@ -1,10 +1,10 @@
 //! Presets of accuracy (`--quality`): points on the fronts that studies of the shipped scenes measured.
 //!
-//! On all of them the ladder of samples *is* the front, once widths are corrected for thinning (DESIGN 3.9) and samples are spread by the
+//! On those measured the ladder of samples *is* the front, once widths are corrected for thinning (DESIGN 3.9) and samples are spread by the
 //! `sobol` sampler: nothing else is at once faster and more accurate by more than a tenth (see `fronts.csv`, which `cargo bench --bench
 //! fronts` writes). So the presets choose the number of samples, each four times the one before, and switch both on. The correction costs
 //! nothing; without, the scene of the paper's rule (`fig5_minimum_width`) has nearly twice the error for the same time. `sobol` suits powers of
-//! two: with `stratified`, `fig1_robot` has 8 to 23 % more error at the same counts, in about the same time. Presets leave all else alone.
+//! two: with `stratified`, `fig2_crossings` has 10 to 37 % more error at the same counts, in about the same time. Presets leave all else alone.
 
 use super::ladder::Settings;
 use crate::scene::settings::Sampler;
