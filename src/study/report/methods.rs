@@ -57,13 +57,14 @@ fn table(study: &Study, summary: &Summary) -> String {
         return String::new();
     }
     let mut html = "<p>Errors in the time that <i>exact</i> takes with a number of samples, read off the lines between the dots; a dash where a \
-                    method's dots do not reach there.</p>\n<div class=\"wide\"><table>\n<thead><tr><th>samples of exact</th><th>CPU, s</th>"
+                    method's dots do not reach there.</p>\n<div class=\"wide\"><table>\n<thead><tr><th colspan=\"2\">exact</th>"
         .to_owned();
     for measure in &COMPARED {
-        for method in METHODS {
-            let place = if measure.name == CROSSINGS.name { ", where lines meet" } else { "" };
-            let _ = write!(html, "<th>{}{place}</th>", method_name(method));
-        }
+        let _ = write!(html, "<th colspan=\"{}\">{}</th>", METHODS.len(), measure.title);
+    }
+    html.push_str("</tr>\n<tr><th>samples</th><th>CPU, s</th>");
+    for method in COMPARED.iter().flat_map(|_| METHODS) {
+        let _ = write!(html, "<th>{}</th>", method_name(method));
     }
     html.push_str("</tr></thead>\n<tbody>\n");
     for time in times {
