@@ -11,6 +11,7 @@ use tusche::render::stats::Sampling;
 use tusche::render::{Control, ErrorGoal, RenderOptions, Report, render_to_error};
 use tusche::sample::PixelRect;
 use tusche::scene::Scene;
+use tusche::scene::settings::Sampler;
 use tusche::shade::{Host, Shaders};
 use tusche::study::{Quality, Settings};
 
@@ -252,7 +253,8 @@ fn a_quality_is_a_number_of_samples_that_can_be_explained() {
     let explained = |flags: &[&str]| place.run(&[&["explain", "scene.toml"], flags].concat()).exits(0).stdout();
     let plan = explained(&["--quality", "final"]);
     assert!(
-        plan.contains("64 samples per pixel\n") && plan.contains("final: 64 samples per pixel, where the scene says 4"),
+        plan.contains("64 samples per pixel\n")
+            && plan.contains("final: 64 samples per pixel, sampler sobol, where the scene says 4 and stratified"),
         "{plan}"
     );
     assert!(plan.contains("times the time of draft") && plan.contains("of the lines' area wrong"), "{plan}");
@@ -260,12 +262,12 @@ fn a_quality_is_a_number_of_samples_that_can_be_explained() {
     let own = Settings::of(&scene_from(SCENE));
     let text = Quality::Preview.explain(&own);
     assert!(
-        text.starts_with("quality         preview: 16 samples per pixel, where the scene says 4; all else"),
+        text.starts_with("quality         preview: 16 samples per pixel, sampler sobol, where the scene says 4 and stratified; all else"),
         "{text}"
     );
     assert!(!Quality::Draft.explain(&own).contains("times the time of draft"), "it is the draft");
     let uncorrected = Settings { width_compensation: false, ..own };
-    assert_eq!(Quality::Final.settings(&uncorrected), Settings { samples: 64, ..own });
+    assert_eq!(Quality::Final.settings(&uncorrected), Settings { samples: 64, sampler: Sampler::Sobol, ..own });
     // What is set by itself has the last word.
     assert!(explained(&["--quality", "draft", "--set", "render.samples=9"]).contains("9 samples per pixel\n"));
     let off = explained(&["--quality", "draft", "--set", "lines.width_compensation=false"]);
@@ -273,8 +275,13 @@ fn a_quality_is_a_number_of_samples_that_can_be_explained() {
     place.run(&["explain", "scene.toml", "--quality", "best"]).exits(2).says("draft").says("final");
 
     place.run(&["render", "scene.toml", "--quality", "draft", "-o", "a.png"]).exits(0);
-    place.run(&["render", "scene.toml", "--samples", "4", "-o", "b.png"]).exits(0);
+    place.run(&["render", "scene.toml", "--samples", "4", "--set", "render.sampler=sobol", "-o", "b.png"]).exits(0);
     assert!(read(&place, "a.png") == read(&place, "b.png"));
+    place
+        .run(&["render", "scene.toml", "--quality", "draft", "--set", "render.sampler=stratified", "-o", "c.png"])
+        .exits(0);
+    place.run(&["render", "scene.toml", "--samples", "4", "-o", "d.png"]).exits(0);
+    assert!(read(&place, "c.png") == read(&place, "d.png"), "what is set by itself has the last word");
 }
 
 fn place() -> Workplace {

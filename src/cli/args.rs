@@ -209,7 +209,8 @@ pub struct SceneArguments {
     /// Samples per pixel.
     #[arg(long, value_name = "N")]
     pub samples: Option<u32>,
-    /// How accurate, from measured fronts of accuracy against time: draft, preview or final are 4, 16 or 64 samples per pixel.
+    /// How accurate, from measured fronts of accuracy against time: draft, preview or final are 4, 16 or 64 samples per pixel,
+    /// spread by the `sobol` sampler, with widths corrected for thinning.
     /// `tusche explain --quality Q` says what it costs.
     #[arg(long, value_name = "Q", conflicts_with = "samples", value_parser = quality())]
     pub quality: Option<Quality>,

@@ -82,6 +82,7 @@ pub(super) fn scene_request(arguments: &SceneArguments, frame: Option<f64>) -> R
     if let Some(quality) = arguments.quality {
         // First, so that what is set by itself has the last word.
         changes.push("lines.width_compensation=true".to_owned());
+        changes.push(format!("render.sampler={}", quality.sampler().name()));
         changes.push(format!("render.samples={}", quality.samples()));
     }
     changes.extend(arguments.set.iter().cloned());

@@ -27,6 +27,7 @@ struct ReferenceNote {
     flip: [Option<f64>; 4],
     coverage: Option<f64>,
     position: Option<f64>,
+    crossings: Option<f64>,
 }
 
 impl Folder {
@@ -35,13 +36,19 @@ impl Folder {
     /// # Errors
     /// If it cannot be made or written to.
     pub fn open(path: &Path) -> Result<Self, Diagnostic> {
-        let pictures = path.join("pictures");
-        for folder in [path, &pictures] {
+        let [pictures, plots] = ["pictures", "plots"].map(|name| path.join(name));
+        for folder in [path, &pictures, &plots] {
             match std::fs::create_dir(folder) {
-                Err(error) if error.kind() != std::io::ErrorKind::AlreadyExists => {
+                Err(error) if error.kind() == std::io::ErrorKind::AlreadyExists => {
+                    if !folder.is_dir() {
+                        let fault = Diagnostic::error("a study writes to a folder, and this is a file").in_file(folder);
+                        return Err(fault.hint("name another folder"));
+                    }
+                }
+                Err(error) => {
                     return Err(Diagnostic::error(format!("cannot make this folder: {error}")).in_file(folder));
                 }
-                _ => {}
+                Ok(()) => {}
             }
         }
         let folder = Self { path: path.to_owned() };
@@ -66,6 +73,12 @@ impl Folder {
     #[must_use]
     pub fn file(&self, name: &str) -> PathBuf {
         self.path.join(name)
+    }
+
+    /// A plot of this name.
+    #[must_use]
+    pub fn plot(&self, name: &str) -> PathBuf {
+        self.path.join("plots").join(format!("{name}.svg"))
     }
 
     /// The picture of a point, or `reference`.
@@ -113,8 +126,8 @@ impl Folder {
             reflections: parts[2],
             rest: parts[3],
         };
-        let ReferenceNote { rmse, flip, coverage, position, .. } = note;
-        Some((shot, note.samples, Errors { rmse: region(rmse), flip: region(flip), coverage, position }))
+        let ReferenceNote { rmse, flip, coverage, position, crossings, .. } = note;
+        Some((shot, note.samples, Errors { rmse: region(rmse), flip: region(flip), coverage, crossings, position }))
     }
 
     /// Keeps a reference, in full precision.
@@ -150,6 +163,7 @@ impl Folder {
             flip: own.flip.parts(),
             coverage: own.coverage,
             position: own.position,
+            crossings: own.crossings,
         };
         let text = serde_json::to_string_pretty(&note)
             .map_err(|error| Diagnostic::error(format!("cannot write the reference: {error}")).in_file(&note_path))?;

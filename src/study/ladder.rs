@@ -18,7 +18,7 @@ pub enum Knob {
     Samples,
     /// Samples per pixel, all else as in the reference: nothing is left but the error of sampling.
     IdealSamples,
-    /// How lines are found.
+    /// How lines are found, at several rates.
     Method,
     /// How samples are spread over a pixel, at several rates.
     Sampler,
@@ -146,7 +146,7 @@ impl Settings {
     pub fn value(&self, knob: Knob) -> String {
         match knob {
             Knob::Samples | Knob::IdealSamples => self.samples.to_string(),
-            Knob::Method => method_name(self.method).to_owned(),
+            Knob::Method => format!("{} {}", method_name(self.method), self.samples),
             Knob::Sampler => format!("{} {}", self.sampler.name(), self.samples),
             Knob::MinWidth => self.min_width.to_string(),
             Knob::WidthCompensation => if self.width_compensation { "on" } else { "off" }.to_owned(),
@@ -157,6 +157,9 @@ impl Settings {
         }
     }
 }
+
+/// The methods that a study compares.
+pub const METHODS: [Method; 3] = [Method::Exact, Method::Choudhury, Method::Bauer];
 
 /// As on the command line.
 #[must_use]
@@ -197,6 +200,8 @@ pub struct Ladder {
 const SAMPLES: [u32; 8] = [1, 2, 4, 9, 16, 36, 64, 144];
 /// Counts that suit every sampler.
 const SAMPLER_SAMPLES: [u32; 3] = [4, 16, 64];
+/// Counts of line methods. The older ones take so much longer that the exact search has four times as many in the same time.
+const METHOD_SAMPLES: [u32; 3] = [1, 4, 16];
 
 impl Ladder {
     /// The ladder of a scene, of the knobs that are asked for.
@@ -230,26 +235,39 @@ impl Ladder {
         })
     }
 
-    /// The points in the order in which they tell most: the scene itself, then the ends and the middle of each ladder
-    /// before what lies between, the ladder of samples before all others. The two highest rates of samples take most of the time,
-    /// so they come last on theirs.
+    /// The points in the order in which they tell most: the scene itself; its ladder of samples but for the two highest rates,
+    /// which take most of the time; the ends and the middle of each other ladder with the scene's samples, then what lies between;
+    /// the two highest rates, and the presets; what has other rates and another setting, too, and last the highest rates of that.
     #[must_use]
     pub fn order(&self) -> Vec<usize> {
-        let mut order = vec![0];
-        for rungs in &self.knobs {
-            let count = rungs.points.len();
-            let is_of_samples = matches!(rungs.knob, Knob::Samples | Knob::IdealSamples);
-            let cheap = if is_of_samples { count.saturating_sub(2) } else { count };
-            for place in bisected(cheap).into_iter().chain(cheap..count) {
-                let point = rungs.points[place];
-                if !order.contains(&point) {
-                    order.push(point);
-                }
+        let own = self.points[0].samples;
+        let mut ranked = vec![(0, 0)];
+        for Rungs { knob, points } in &self.knobs {
+            let mut rates: Vec<u32> = points.iter().map(|point| self.points[*point].samples).collect();
+            rates.sort_unstable();
+            rates.dedup();
+            let highest = rates.get(rates.len().saturating_sub(2)).copied().unwrap_or(own).max(own + 1);
+            let group = |point: usize| match (knob, self.points[point].samples) {
+                (Knob::Samples, samples) if samples < highest => 0,
+                (Knob::Samples, _) => 1,
+                (_, samples) if samples == own => 2,
+                (_, samples) if samples < highest => 3,
+                _ => 4,
+            };
+            // Of the first three of each group, and of the rest.
+            for (number, ranks) in [[1, 1], [4, 4], [2, 3], [5, 5], [6, 6]].into_iter().enumerate() {
+                let part: Vec<usize> = points.iter().copied().filter(|point| group(*point) == number).collect();
+                let places = bisected(part.len()).into_iter().enumerate();
+                ranked.extend(places.map(|(place, of_part)| (ranks[usize::from(place >= 3)], part[of_part])));
             }
         }
-        for (_, point) in &self.presets {
-            if !order.contains(point) {
-                order.push(*point);
+        ranked.extend(self.presets.iter().map(|(_, point)| (4, *point)));
+        // Stable: among equals the more telling knob comes first.
+        ranked.sort_by_key(|(rank, _)| *rank);
+        let mut order = Vec::new();
+        for (_, point) in ranked {
+            if !order.contains(&point) {
+                order.push(point);
             }
         }
         order
@@ -344,7 +362,9 @@ fn rungs(
             return Err("no line can be seen");
         }
         Knob::Method => {
-            [Method::Exact, Method::Choudhury, Method::Bauer].map(|method| Settings { method, ..*own }).to_vec()
+            let all = counts(&METHOD_SAMPLES, own.samples);
+            let at = |method| all.iter().map(move |samples| Settings { method, samples: *samples, ..*own });
+            METHODS.into_iter().flat_map(at).collect()
         }
         Knob::Sampler => {
             let all = counts(&SAMPLER_SAMPLES, own.samples);
@@ -429,7 +449,7 @@ impl fmt::Display for Ladder {
                 let value = self.points[*point].value(*knob);
                 if *point == 0 { format!("[{value}]") } else { value }
             });
-            let separator = if matches!(knob, Knob::Filter | Knob::Sampler) { ", " } else { " " };
+            let separator = if matches!(knob, Knob::Filter | Knob::Method | Knob::Sampler) { ", " } else { " " };
             writeln!(f, "{:<20}{}", knob.name(), values.collect::<Vec<_>>().join(separator))?;
         }
         for (knob, why) in &self.left_out {

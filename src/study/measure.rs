@@ -39,6 +39,8 @@ pub struct Errors {
     pub flip: ByRegion,
     /// Σ |coverage − reference| / Σ reference: which share of the lines' area is wrong.
     pub coverage: Option<f64>,
+    /// The same where lines meet; see [`Reference::errors`].
+    pub crossings: Option<f64>,
     /// Mean distance of lines from where they should be, in pixels; see [`Reference::errors`].
     pub position: Option<f64>,
 }
@@ -96,6 +98,7 @@ impl Errors {
             rmse: self.rmse.map(scale),
             flip: self.flip.map(scale),
             coverage: self.coverage.map(scale),
+            crossings: self.crossings.map(scale),
             position: self.position.map(scale),
         }
     }
@@ -112,12 +115,17 @@ enum Region {
 const INK: f32 = 0.01;
 /// Share of the reference's ink around a place below which a picture counts as having no line there.
 const MISSING: f64 = 0.1;
+/// From this ratio on of the ink's variances along and across, lines meet there: a straight line has 1/16 at most, as the discs are
+/// chosen, two that cross at 45° have 0.17, a right angle 0.25, a right crossing 1.
+const MEETING: f64 = 0.15;
 
 /// A picture to compare with.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reference {
     shot: Shot,
     regions: Vec<Region>,
+    /// Pixels around which lines meet.
+    crossings: Vec<usize>,
     /// Radius of the discs in which the place of a line is told, in pixels.
     radius: i32,
 }
@@ -140,7 +148,10 @@ impl Reference {
             (false, false) => Region::Rest,
         };
         let regions = (0..shot.colors.len()).map(region).collect();
-        Self { shot, regions, radius: (widest / 2.0).clamp(0.0, 32.0).ceil() as i32 + 2 }
+        let around = 2 * widest.clamp(0.0, 32.0).ceil() as i32 + 2;
+        let meets = |i: &usize| shot.coverage[*i] >= INK && Moments::around(&shot, &shot.coverage, *i, around).meet();
+        let crossings = (0..shot.coverage.len()).filter(meets).collect();
+        Self { shot, regions, crossings, radius: (widest / 2.0).clamp(0.0, 32.0).ceil() as i32 + 2 }
     }
 
     /// The picture itself.
@@ -155,6 +166,9 @@ impl Reference {
     /// centroid from the reference's in the same disc. Along the line both lie in the disc's middle, so what is left is
     /// the distance across. It is averaged over all pixels, weighted by the reference's coverage. Where the picture has
     /// less than a tenth of the ink, the line is missing, and its error is the disc's radius.
+    ///
+    /// Lines meet in pixels of lines around which the reference's ink is no stroke: in a disc whose radius is twice the width of the widest
+    /// line, its variance along is not much larger than that across. These are crossings, junctions, corners, and lines side by side.
     #[must_use]
     pub fn errors(&self, test: &Shot) -> Errors {
         let (reference, regions) = (&self.shot, &self.regions);
@@ -168,6 +182,11 @@ impl Reference {
             rmse: ByRegion::of(regions, square, f64::sqrt),
             flip: ByRegion::of(regions, |i| f64::from(flip[i]), |mean| mean),
             coverage: has_ink.then(|| wrong_share(&reference.coverage, &test.coverage)),
+            crossings: (!self.crossings.is_empty()).then(|| {
+                let [reference, test] =
+                    [&reference.coverage, &test.coverage].map(|ink| self.crossings.iter().map(|i| ink[*i]));
+                wrong_share(&reference.collect::<Vec<_>>(), &test.collect::<Vec<_>>())
+            }),
             position: self.position(&test.coverage),
         }
     }
@@ -175,32 +194,54 @@ impl Reference {
     fn position(&self, test: &[f32]) -> Option<f64> {
         let (mut sum, mut weights) = (0.0, 0.0);
         for (i, coverage) in self.shot.coverage.iter().enumerate().filter(|(_, coverage)| **coverage >= INK) {
-            let [expected, found] = [&self.shot.coverage, test].map(|ink| self.centroid(ink, i));
-            let missing = found[2] < MISSING * expected[2];
-            let across = |axis: usize| found[axis] / found[2] - expected[axis] / expected[2];
+            let [expected, found] =
+                [&self.shot.coverage, test].map(|ink| Moments::around(&self.shot, ink, i, self.radius));
+            let missing = found.ink < MISSING * expected.ink;
+            let across = |axis: usize| found.first[axis] / found.ink - expected.first[axis] / expected.ink;
             let distance = if missing { f64::from(self.radius) } else { across(0).hypot(across(1)) };
             sum += f64::from(*coverage) * distance;
             weights += f64::from(*coverage);
         }
         (weights > 0.0).then(|| sum / weights)
     }
+}
 
-    /// Moments of the ink around a pixel: x, y and 1.
-    fn centroid(&self, ink: &[f32], pixel: usize) -> [f64; 3] {
-        let width = self.shot.width as i32;
-        let (x0, y0, height) = (pixel as i32 % width, pixel as i32 / width, (ink.len() / self.shot.width) as i32);
-        let mut moments = [0.0; 3];
-        for y in (y0 - self.radius).max(0)..(y0 + self.radius + 1).min(height) {
-            let half = f64::from(self.radius * self.radius - (y - y0) * (y - y0)).sqrt() as i32;
+/// Moments of the ink around a pixel.
+#[derive(Clone, Copy, Debug, Default)]
+struct Moments {
+    ink: f64,
+    /// Of x and y, from the pixel.
+    first: [f64; 2],
+    /// Of x², xy and y².
+    second: [f64; 3],
+}
+
+impl Moments {
+    /// Those of the ink of a picture as large as `shot`, in a disc around a pixel.
+    fn around(shot: &Shot, ink: &[f32], pixel: usize, radius: i32) -> Self {
+        let width = shot.width as i32;
+        let (x0, y0, height) = (pixel as i32 % width, pixel as i32 / width, (ink.len() / shot.width) as i32);
+        let mut moments = Self::default();
+        for y in (y0 - radius).max(0)..(y0 + radius + 1).min(height) {
+            let half = f64::from(radius * radius - (y - y0) * (y - y0)).sqrt() as i32;
             for x in (x0 - half).max(0)..(x0 + half + 1).min(width) {
                 let ink = f64::from(ink[(y * width + x) as usize]);
-                [f64::from(x - x0), f64::from(y - y0), 1.0]
-                    .iter()
-                    .zip(&mut moments)
-                    .for_each(|(x, sum)| *sum += x * ink);
+                let [x, y] = [x - x0, y - y0].map(f64::from);
+                moments.ink += ink;
+                moments.first.iter_mut().zip([x, y]).for_each(|(sum, x)| *sum += x * ink);
+                moments.second.iter_mut().zip([x * x, x * y, y * y]).for_each(|(sum, x)| *sum += x * ink);
             }
         }
         moments
+    }
+
+    /// Whether lines meet here: the ink is no stroke.
+    fn meet(&self) -> bool {
+        let [x, y] = self.first.map(|sum| sum / self.ink);
+        let [xx, xy, yy] = self.second.map(|sum| sum / self.ink);
+        let [xx, xy, yy] = [xx - x * x, xy - x * y, yy - y * y];
+        let (mean, half) = ((xx + yy) / 2.0, ((xx - yy) / 2.0).hypot(xy));
+        mean - half > MEETING * (mean + half)
     }
 }
 
@@ -272,6 +313,34 @@ mod tests {
         assert!((found.rmse.lines.unwrap_or(0.0) - (2.0_f64 / 4.0 * 0.25).sqrt()).abs() < 1e-6, "{found:?}");
         assert_eq!((found.rmse.reflections, found.rmse.rest), (None, Some(0.0)));
         assert_eq!(reference.errors(&line(20.0, 2.0)).scaled(2.0).rmse.all, 0.0);
+    }
+
+    #[test]
+    fn lines_meet_at_crossings_and_corners_and_nowhere_else() {
+        // Two lines through the middle, at an angle; the second may begin there.
+        let crossed = |degrees: f32, begins: bool| {
+            let [cos, sin] = [degrees.to_radians().cos(), degrees.to_radians().sin()];
+            let mut shot = line(20.0, 2.0);
+            for (i, ink) in shot.coverage.iter_mut().enumerate() {
+                let [x, y] = [i % SIDE, i / SIDE].map(|place| place as f32 + 0.5 - 20.0);
+                let [along, across] = [y * cos + x * sin, x * cos - y * sin];
+                if across.abs() < 1.0 && (along > 0.0 || !begins) {
+                    *ink = 1.0;
+                }
+            }
+            Reference::new(shot, 2.0)
+        };
+        assert!(crossed(0.0, false).crossings.is_empty(), "a straight line");
+        for (degrees, begins) in [(90.0, false), (60.0, false), (90.0, true)] {
+            let reference = crossed(degrees, begins);
+            assert!(reference.crossings.contains(&(20 * SIDE + 20)), "{degrees}°");
+            let near = |i: &usize| (i % SIDE).abs_diff(20).max((i / SIDE).abs_diff(20)) <= 8;
+            assert!(reference.crossings.iter().all(near), "{degrees}°: {:?}", reference.crossings);
+            // Without the second line, only what was there of it is wrong.
+            let found = reference.errors(&line(20.0, 2.0));
+            let [all, met] = [found.coverage, found.crossings].map(|error| error.unwrap_or(f64::NAN));
+            assert!(met > 0.1 && met < 0.7 && all > 0.2, "{degrees}°: {found:?}");
+        }
     }
 
     #[test]

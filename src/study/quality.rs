@@ -1,11 +1,13 @@
 //! Presets of accuracy (`--quality`): points on the fronts that studies of the shipped scenes measured.
 //!
-//! On all of them the ladder of samples *is* the front, once widths are corrected for thinning (DESIGN 3.9): nothing else is at
-//! once faster and more accurate by more than a tenth (see `fronts.csv`, which `cargo bench --bench fronts` writes). So the presets
-//! choose the number of samples, each four times the one before, and switch the correction on, which costs nothing: without, the
-//! scene of the paper's rule (`fig5_minimum_width`) has nearly twice the error for the same time. They leave all else alone.
+//! On those measured the ladder of samples *is* the front, once widths are corrected for thinning (DESIGN 3.9) and samples are spread by the
+//! `sobol` sampler: nothing else is at once faster and more accurate by more than a tenth (see `fronts.csv`, which `cargo bench --bench
+//! fronts` writes). So the presets choose the number of samples, each four times the one before, and switch both on. The correction costs
+//! nothing; without, the scene of the paper's rule (`fig5_minimum_width`) has nearly twice the error for the same time. `sobol` suits powers of
+//! two: with `stratified`, `fig2_crossings` has 10 to 37 % more error at the same counts, in about the same time. Presets leave all else alone.
 
 use super::ladder::Settings;
+use crate::scene::settings::Sampler;
 
 /// A preset.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -52,10 +54,16 @@ impl Quality {
         }
     }
 
+    /// How samples are spread over a pixel.
+    #[must_use]
+    pub const fn sampler(self) -> Sampler {
+        Sampler::Sobol
+    }
+
     /// The settings of a scene with this preset.
     #[must_use]
     pub fn settings(self, own: &Settings) -> Settings {
-        Settings { samples: self.samples(), width_compensation: true, ..*own }
+        Settings { samples: self.samples(), sampler: self.sampler(), width_compensation: true, ..*own }
     }
 
     /// What was chosen and what it costs, as `tusche explain` shows it. `own` are the scene's own settings.
@@ -77,12 +85,14 @@ impl Quality {
         let compensation =
             if own.width_compensation { "" } else { ", width_compensation on, which the scene turns off" };
         format!(
-            "{:<16}{}: {} samples per pixel, where the scene says {}{compensation}; all else as in the scene\n{:<16}on the shipped scenes, median \
-             (least to greatest): {}\n",
+            "{:<16}{}: {} samples per pixel, sampler {}, where the scene says {} and {}{compensation}; all else as in the scene\n\
+             {:<16}on the shipped scenes, median (least to greatest): {}\n",
             "quality",
             self.name(),
             self.samples(),
+            self.sampler().name(),
             own.samples,
+            own.sampler.name(),
             "",
             costs.join("; ")
         )

@@ -81,7 +81,7 @@ pub struct Study {
     pub complete: bool,
 }
 
-/// Called with the share that is done, 0 … 1, and with what is done next.
+/// Called from any thread with the share that is done, 0 … 1, and with what is being done.
 pub type Progress<'a> = &'a (dyn Fn(f64, &str) + Sync);
 
 /// How a caller follows and stops a study.
@@ -141,27 +141,45 @@ pub fn study(
     };
     let deadline = options.budget.map(|budget| start + budget);
 
+    // Drawn widths come last.
+    let measures_widths = options.widths && camera.truth.is_some();
+    let end = if measures_widths { 0.9 } else { 1.0 };
+    let mut work = Work { control, start, budget: options.budget, end, done: 0.0, all: 0.0 };
+    let waiting = |runs: &[Run]| {
+        let all =
+            (0..options.repeats.max(1)).flat_map(|repeat| ladder.order().into_iter().map(move |point| (point, repeat)));
+        let is_missing = |(point, repeat): &(usize, u32)| {
+            !runs.iter().any(|run| run.repeat == *repeat && run.is_of(&ladder.points[*point]))
+        };
+        all.filter(is_missing).collect::<Vec<_>>()
+    };
+    let samples_of =
+        |waiting: &[(usize, u32)]| waiting.iter().map(|(point, _)| ladder.points[*point].samples).sum::<u32>();
+
     // The scene's own picture tells what all others will take.
     let mut first = None;
-    let known_seconds = known.iter().find(|run| run.scene == camera.key && run.is_of(&ladder.points[0]));
-    let per_sample = match known_seconds {
+    let mut runs: Vec<Run> = known.into_iter().filter(|run| run.scene == camera.key).collect();
+    let kept = folder.reference(&camera.key);
+    let kept = kept.filter(|kept| options.budget.is_some() || kept.1 == options.reference.max(2));
+    work.all = f64::from(samples_of(&waiting(&runs))) + kept.as_ref().map_or(f64::from(options.reference), |_| 0.0);
+    let per_sample = match runs.iter().find(|run| run.is_of(&ladder.points[0])) {
         Some(run) => run.wall_seconds,
         None => {
-            control.say(0.0, "the scene");
-            let Some((shot, stats)) = camera.shoot(&ladder.points[0], 0)? else { return Err(stopped()) };
+            let advance = work.of("the scene", ladder.points[0].samples);
+            let Some((shot, stats)) = camera.shoot(&ladder.points[0], 0, &advance)? else { return Err(stopped()) };
             first.insert((shot, stats)).1.seconds.total
         }
     } / f64::from(ladder.points[0].samples);
-    let (reference, samples, own) = match folder.reference(&camera.key) {
-        Some((shot, samples, own)) if options.budget.is_some() || samples == options.reference.max(2) => {
-            (Reference::new(shot, lines.widest), samples, own)
-        }
-        _ => {
+    let (reference, samples, own) = match kept {
+        Some((shot, samples, own)) => (Reference::new(shot, lines.widest), samples, own),
+        None => {
             let samples = reference_samples(options, ladder.points[0].samples, per_sample)?;
-            control.say(0.01, "the reference");
-            let Some((shot, own)) = camera.reference(&ladder.ideal, samples, lines.widest)? else {
+            work.all += f64::from(samples) - f64::from(options.reference);
+            let advance = work.of("the reference", samples);
+            let Some((shot, own)) = camera.reference(&ladder.ideal, samples, lines.widest, &advance)? else {
                 return Err(stopped());
             };
+            work.done += f64::from(samples);
             folder.keep_reference(&camera.key, samples, &shot, &own)?;
             (Reference::new(shot, lines.widest), samples, own)
         }
@@ -169,21 +187,9 @@ pub fn study(
     folder.keep_picture("reference", reference.shot())?;
 
     let identity = (camera.key.as_str(), samples);
-    let mut runs: Vec<Run> =
-        known.into_iter().filter(|run| run.scene == identity.0 && run.reference == samples).collect();
-    let mut waiting = Vec::new();
-    for repeat in 0..options.repeats.max(1) {
-        for point in ladder.order() {
-            let settings = &ladder.points[point];
-            if !runs.iter().any(|run| run.repeat == repeat && run.is_of(settings)) {
-                waiting.push((point, repeat));
-            }
-        }
-    }
-    // Drawn widths come last.
-    let pictures = if options.widths && camera.truth.is_some() { 0.9 } else { 1.0 };
-    let mut done = f64::from(samples);
-    let all = done + waiting.iter().map(|(point, _)| f64::from(ladder.points[*point].samples)).sum::<f64>();
+    runs.retain(|run| run.reference == samples);
+    let waiting = waiting(&runs);
+    work.all = work.done + f64::from(samples_of(&waiting));
     let (mut left_out, mut complete) = (0, true);
     for (point, repeat) in waiting {
         let settings = &ladder.points[point];
@@ -195,20 +201,20 @@ pub fn study(
             left_out += 1;
             continue;
         }
-        control.say(done / all * pictures, &ladder.name(point));
-        let shot = if taken.is_some() { taken } else { camera.shoot(settings, repeat)? };
+        let name = ladder.name(point);
+        let advance = work.of(&name, settings.samples);
+        let shot = if taken.is_some() { taken } else { camera.shoot(settings, repeat, &advance)? };
         let Some((shot, stats)) = shot else {
             complete = false;
             break;
         };
         runs.push(Run::new(identity, settings, repeat, &stats, &reference.errors(&shot)));
         if repeat == 0 {
-            folder.keep_picture(&ladder.name(point), &shot)?;
+            folder.keep_picture(&name, &shot)?;
         }
         table::write(&folder.table(), &runs)?;
-        done += f64::from(settings.samples);
+        work.done += f64::from(settings.samples);
     }
-    let measures_widths = options.widths && camera.truth.is_some();
     let widths = if measures_widths && complete {
         let (widths, missing) = drawn_widths(&folder, options.threads, deadline, control)?;
         left_out += missing;
@@ -231,6 +237,33 @@ pub fn study(
         left_out,
         complete,
     })
+}
+
+/// How far a study is, in samples per pixel.
+struct Work<'a> {
+    control: &'a StudyControl<'a>,
+    start: Instant,
+    budget: Option<Duration>,
+    done: f64,
+    all: f64,
+    /// The share of the whole study at which all pictures are taken.
+    end: f64,
+}
+
+impl<'a> Work<'a> {
+    /// Follows a picture, or a pair of them, as its share of the whole.
+    fn of<'b>(&self, what: &'b str, samples: u32) -> impl Fn(f64) + Sync + use<'a, 'b> {
+        let (control, scale) = (self.control, self.end / self.all.max(1.0));
+        let (done, samples) = (self.done * scale, f64::from(samples) * scale);
+        let (start, budget) = (self.start, self.budget);
+        // Whichever ends it first: all is done, or the budget is used up.
+        let say = move |share: f64| {
+            let used = budget.map_or(0.0, |budget| start.elapsed().as_secs_f64() / budget.as_secs_f64().max(1e-9));
+            control.say((done + share * samples).max(used.min(1.0)), what);
+        };
+        say(0.0);
+        say
+    }
 }
 
 /// How wide lines are drawn, and how many widths there was no time for.
@@ -292,7 +325,7 @@ pub fn reference_samples(options: &StudyOptions, own: u32, per_sample: f64) -> R
     }
     let needed = (f64::from(least) * per_sample / 0.4).max(0.1);
     let fault = Diagnostic::error(format!(
-        "a budget of {:.1} s is too small: the reference needs {:.1} s even with only {least} samples",
+        "a budget of {} s is too small: the reference needs {:.1} s even with only {least} samples",
         budget.as_secs_f64(),
         f64::from(least) * per_sample
     ));
@@ -327,6 +360,9 @@ struct Declared {
 /// Less than this share of the lines' area need not mean that a scene declares other lines than it shows.
 const LEAST_DOUBT: f64 = 0.1;
 
+/// Called with the share of a picture that is done.
+type Advance<'a> = dyn Fn(f64) + Sync + 'a;
+
 /// Takes pictures of one scene with changing settings.
 struct Camera<'a> {
     truth: Option<Declared>,
@@ -342,9 +378,14 @@ struct Camera<'a> {
 
 impl Camera<'_> {
     /// A picture with the seed of a repeat: the scene's own for the first. `None` if it was stopped.
-    fn shoot(&self, settings: &Settings, repeat: u32) -> Result<Option<(Shot, Stats)>, Diagnostics> {
+    fn shoot(
+        &self,
+        settings: &Settings,
+        repeat: u32,
+        advance: &Advance<'_>,
+    ) -> Result<Option<(Shot, Stats)>, Diagnostics> {
         let seed = if repeat == 0 { self.seed } else { self.unused_seed(u64::from(repeat) + 16) };
-        let planes = self.take(settings, seed, &[Layer::Rgba, Layer::Line])?;
+        let planes = self.take(settings, seed, &[Layer::Rgba, Layer::Line], advance)?;
         Ok(planes.map(|(planes, stats)| (shot(self.size[0] as usize, &planes, None), stats)))
     }
 
@@ -353,14 +394,21 @@ impl Camera<'_> {
     ///
     /// # Errors
     /// If the scene shows other lines than it declares.
-    fn reference(&self, ideal: &Settings, samples: u32, widest: f32) -> Result<Option<(Shot, Errors)>, Diagnostics> {
+    fn reference(
+        &self,
+        ideal: &Settings,
+        samples: u32,
+        widest: f32,
+        advance: &Advance<'_>,
+    ) -> Result<Option<(Shot, Errors)>, Diagnostics> {
         let settings = Settings { samples: samples.div_ceil(2), ..*ideal };
         let mut layers = vec![Layer::Rgba, Layer::Line];
         if self.secondary {
             layers.extend([LinePath::Reflection, LinePath::Refraction].map(Layer::LinePath));
         }
-        let half = |purpose| {
-            let planes = self.take(&settings, self.unused_seed(purpose), &layers)?;
+        let half = |purpose: u64| {
+            let advance = |share: f64| advance((share + purpose as f64 - 1.0) / 2.0);
+            let planes = self.take(&settings, self.unused_seed(purpose), &layers, &advance)?;
             let declared = self.truth.as_ref().map(|truth| &truth.coverage[..]);
             Ok::<_, Diagnostics>(planes.map(|(planes, _)| shot(self.size[0] as usize, &planes, declared)))
         };
@@ -380,7 +428,7 @@ impl Camera<'_> {
             return Err(fault.hint(hint).into());
         }
         shot.coverage.clone_from(&truth.coverage);
-        Ok(Some((shot, Errors { coverage: None, position: None, ..own })))
+        Ok(Some((shot, Errors { coverage: None, crossings: None, position: None, ..own })))
     }
 
     /// Seeds that nobody chooses, so that no pattern is used for two purposes.
@@ -389,7 +437,13 @@ impl Camera<'_> {
     }
 
     /// The channels of layers.
-    fn take(&self, settings: &Settings, seed: u64, layers: &[Layer]) -> Result<Option<(Planes, Stats)>, Diagnostics> {
+    fn take(
+        &self,
+        settings: &Settings,
+        seed: u64,
+        layers: &[Layer],
+        advance: &Advance<'_>,
+    ) -> Result<Option<(Planes, Stats)>, Diagnostics> {
         let mut builder = self.builder.clone();
         settings.apply(&mut builder);
         builder.render.seed = seed;
@@ -410,7 +464,7 @@ impl Camera<'_> {
             Ok(())
         };
         let options = RenderOptions { threads: self.threads, method: settings.method, ..RenderOptions::default() };
-        let control = Control { cancel: self.cancel, progress: None };
+        let control = Control { cancel: self.cancel, progress: Some(advance) };
         // The process is the same for all pictures; what it always holds (the scene, the reference) is in every peak.
         let reset = reset_peak_memory();
         let mut report = render(&scene, self.shaders, &plan, &options, &control, &emit)?;

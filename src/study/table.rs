@@ -56,6 +56,7 @@ pub struct Run {
     pub flip_rest: Option<f64>,
     pub line_coverage: Option<f64>,
     pub line_position: Option<f64>,
+    pub line_crossings: Option<f64>,
 }
 
 impl Run {
@@ -96,6 +97,7 @@ impl Run {
             flip_rest: errors.flip.rest,
             line_coverage: errors.coverage,
             line_position: errors.position,
+            line_crossings: errors.crossings,
         }
     }
 
@@ -132,6 +134,7 @@ impl Run {
             },
             coverage: self.line_coverage,
             position: self.line_position,
+            crossings: self.line_crossings,
         }
     }
 

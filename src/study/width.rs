@@ -44,6 +44,17 @@ impl Edge {
         }
     }
 
+    /// As files call it.
+    #[must_use]
+    pub const fn file_name(self) -> &'static str {
+        match self {
+            Self::Straight => "straight",
+            Self::Disc20 => "disc20",
+            Self::Disc5 => "disc5",
+            Self::Square12 => "square12",
+        }
+    }
+
     /// Half the side of the square that is sampled, without what lines reach beyond it.
     fn half_window(self) -> i32 {
         match self {

@@ -72,19 +72,19 @@ fn a_study_writes_a_table_numbers_pictures_and_a_page() {
             "scene,reference,samples,sampler,method,min_width,width_compensation,surfaces,reflection_depth,refraction_depth,filter,\
              filter_radius,repeat,threads,wall_seconds,build_seconds,trace_seconds,shade_seconds,lines_seconds,film_seconds,\
              peak_rss_bytes,bytes_per_sample,rmse,rmse_lines,rmse_reflections,rmse_rest,flip,flip_lines,flip_reflections,flip_rest,\
-             line_coverage,line_position"
+             line_coverage,line_position,line_crossings"
         )
     );
-    // 8 rates and 2 more methods, twice.
-    assert_eq!(table.lines().count(), 1 + 2 * (8 + 2));
+    // 8 rates, and 2 more methods at 3 rates, twice.
+    assert_eq!(table.lines().count(), 1 + 2 * (8 + 2 * 3));
 
     let found = numbers(&place.folder.path().join("out"));
     let keys: Vec<_> = found.as_object().map(|map| map.keys().map(String::as_str).collect()).unwrap_or_default();
-    let expected = "scene size version threads complete left_out_for_time reference knobs knobs_that_do_not_matter points fits fronts presets drawn_widths";
+    let expected = "scene size version threads complete left_out_for_time reference knobs knobs_that_do_not_matter points fits fronts presets methods_in_equal_time drawn_widths";
     assert_eq!(keys.join(" "), expected);
     assert_eq!((&found["complete"], &found["left_out_for_time"]), (&Value::Bool(true), &Value::from(0)));
     let points = found["points"].as_array().expect("there are points");
-    assert_eq!(points.len(), 10);
+    assert_eq!(points.len(), 14);
     let coverage = |samples: u64| {
         let is_it = |point: &&Value| point["settings"]["samples"] == samples && point["settings"]["method"] == "exact";
         let point = points.iter().find(is_it).expect("the point was measured");
@@ -111,11 +111,31 @@ fn a_study_writes_a_table_numbers_pictures_and_a_page() {
     assert_eq!((&fit["knob"], &fit["error"]), (&"samples".into(), &"line_coverage".into()));
     let slope = fit["exponent"]["by_samples"].as_f64().expect("a slope is fitted");
     assert!((-1.0..-0.4).contains(&slope), "{slope}");
-    let bauer = points.iter().find(|point| point["settings"]["method"] == "bauer").expect("bauer was tried");
+    let is_bauer = |point: &&Value| point["settings"]["samples"] == 4 && point["settings"]["method"] == "bauer";
+    let bauer = points.iter().find(is_bauer).expect("bauer was tried");
     let bauer = bauer["errors"]["line_coverage"]["mean"].as_f64().expect("there are lines");
     assert!(bauer > coverage(4), "the exact search is nearer to the truth: {bauer} {}", coverage(4));
+    // A square has corners.
+    assert!(
+        points.iter().all(|point| point["errors"]["line_crossings"]["mean"].as_f64().is_some_and(|error| error > 0.0))
+    );
+    for time in found["methods_in_equal_time"].as_array().expect("methods are compared") {
+        for errors in [&time["errors"]["line_coverage"], &time["errors"]["line_crossings"]] {
+            let of = |method: &str| errors[method].as_f64();
+            let exact = of("exact").expect("it is its own time");
+            // Which of these can be compared depends on the machine.
+            for other in ["choudhury", "bauer"].into_iter().filter_map(of) {
+                assert!(other > exact, "the exact search is nearer in the same time: {time}");
+            }
+        }
+    }
 
-    for picture in ["reference", "the_scene", "samples_144", "method_choudhury"] {
+    for plot in ["line_coverage", "flip", "methods_line_coverage"] {
+        let text = read(&place, &format!("out/plots/{plot}.svg"));
+        assert!(text.starts_with("<svg xmlns=") && !text.contains("NaN"), "{plot}");
+        assert_eq!(text.matches("<svg ").count(), text.matches("</svg>").count(), "{plot}");
+    }
+    for picture in ["reference", "the_scene", "samples_144", "method_choudhury_16"] {
         assert!(place.folder.path().join(format!("out/pictures/{picture}.png")).is_file(), "{picture}");
     }
 }
@@ -163,7 +183,7 @@ fn a_stopped_study_goes_on_and_comes_to_the_same() {
     place.run(&[&FEW[..], &["-o", "whole"]].concat()).exits(0);
     place.run(&[&FEW[..], &["-o", "parts", "--threads", "1"]].concat()).exits(0);
     let table = read(&place, "whole/study.csv");
-    assert_eq!(table.lines().count(), 1 + 6);
+    assert_eq!(table.lines().count(), 1 + 18);
 
     // As if it had been stopped after two pictures.
     let begun: Vec<_> = table.lines().take(3).collect();
@@ -184,7 +204,7 @@ fn a_stopped_study_goes_on_and_comes_to_the_same() {
     // Another scene, or another reference: nothing of it is of use.
     place.run(&[&FEW[..], &["-o", "parts", "--set", "lines.width=3"]].concat()).exits(0);
     let other = read(&place, "parts/study.csv");
-    assert_eq!(other.lines().count(), 1 + 6);
+    assert_eq!(other.lines().count(), 1 + 18);
     assert!(begun[1..].iter().all(|row| !other.contains(row)));
 }
 
@@ -199,13 +219,13 @@ fn a_budget_takes_what_tells_most_first() {
     assert_eq!(reference_samples(&options(3600.0), 16, 0.01).ok(), Some(1024));
     assert_eq!(reference_samples(&options(10.0), 16, 0.01).ok(), Some(400));
     let fault = reference_samples(&options(1.0), 16, 0.01).expect_err("64 samples take 0.64 s");
-    assert!(fault.to_string().contains("a budget of 1.0 s is too small"), "{fault}");
+    assert!(fault.to_string().contains("a budget of 1 s is too small"), "{fault}");
     assert!(fault.hints[0].contains("--budget 2s"), "{fault}");
     assert_eq!(reference_samples(&StudyOptions::default(), 16, 1e9).ok(), Some(1024), "no budget, no limit");
 
     let place = place();
     place.run(&[&FEW[..], &["-o", "out", "--budget", "1h"]].concat()).exits(0);
-    assert_eq!(read(&place, "out/study.csv").lines().count(), 1 + 6);
+    assert_eq!(read(&place, "out/study.csv").lines().count(), 1 + 18);
     place
         .run(&[&FEW[..], &["-o", "none", "--budget", "0.000001s"]].concat())
         .exits(1)
@@ -215,7 +235,7 @@ fn a_budget_takes_what_tells_most_first() {
     place.file("scene.toml", SCENE);
     let run = place.run(&["study", "scene.toml", "-o", "out", "--budget", "0.000001s", "--reference", "32"]).exits(0);
     assert!(run.stderr().contains("did not fit into the budget"), "{}", run.stderr());
-    assert_eq!(numbers(&place.folder.path().join("out"))["points"].as_array().map(Vec::len), Some(3));
+    assert_eq!(numbers(&place.folder.path().join("out"))["points"].as_array().map(Vec::len), Some(9));
 }
 
 #[test]

@@ -1,7 +1,10 @@
-//! What a study found, for people and programs: `index.html` and `study.json` beside `study.csv`.
+//! What a study found, for people and programs: `index.html`, the plots by themselves and `study.json` beside `study.csv`.
 
 mod crops;
+mod figures;
+mod methods;
 mod page;
+mod samplers;
 pub mod summary;
 mod svg;
 mod widths;
@@ -11,7 +14,7 @@ use std::path::Path;
 use serde_json::{Map, Value, json};
 
 use super::folder::Folder;
-use super::ladder::{Knob, Settings, method_name};
+use super::ladder::{Knob, METHODS, Settings, method_name};
 use super::measure::{ByRegion, Errors};
 use super::run::Study;
 use crate::diag::Diagnostic;
@@ -19,7 +22,7 @@ use crate::film::write_atomically;
 use crate::plan::filter_name;
 use summary::{MEASURES, Mean, Point, STAGES, Summary};
 
-/// Writes `study.json` and `index.html` into the folder of a study.
+/// Writes `study.json`, `index.html` and the folder `plots` into the folder of a study.
 ///
 /// # Errors
 /// If a file cannot be written.
@@ -28,7 +31,10 @@ pub fn write(study: &Study, folder: &Path) -> Result<(), Diagnostic> {
     let summary = Summary::new(study);
     let text = format!("{:#}\n", json(study, &summary));
     write_atomically(&folder.file("study.json"), |sink| sink.write_all(text.as_bytes()))?;
-    let page = page::page(study, &summary, &folder);
+    let (page, figures) = page::page(study, &summary, &folder);
+    for (name, text) in &figures.files {
+        write_atomically(&folder.plot(name), |sink| sink.write_all(text.as_bytes()))?;
+    }
     write_atomically(&folder.file("index.html"), |sink| sink.write_all(page.as_bytes()))
 }
 
@@ -59,6 +65,19 @@ pub fn json(study: &Study, summary: &Summary) -> Value {
         });
         json!({ "name": quality.name(), "point": point, "behind_front": behind.collect::<Map<_, _>>() })
     });
+    let methods = summary.equal_times(study, &methods::COMPARED).into_iter().map(|time| {
+        let of_methods = |errors: &[Option<f64>; METHODS.len()]| {
+            METHODS
+                .iter()
+                .zip(errors)
+                .map(|(method, error)| (method_name(*method).to_owned(), json!(error)))
+                .collect::<Map<_, _>>()
+        };
+        let errors = methods::COMPARED.iter().zip(&time.errors);
+        let errors: Map<_, _> =
+            errors.map(|(measure, errors)| (measure.name.to_owned(), of_methods(errors).into())).collect();
+        json!({ "samples_of_exact": time.samples, "cpu_seconds": time.seconds, "errors": errors })
+    });
     let threads = study.runs.iter().flatten().next().map(|run| run.threads);
     json!({
         "scene": study.title,
@@ -79,6 +98,7 @@ pub fn json(study: &Study, summary: &Summary) -> Value {
         "fits": fits.chain(of_samplers).collect::<Vec<_>>(),
         "fronts": fronts.collect::<Map<_, _>>(),
         "presets": presets.collect::<Vec<_>>(),
+        "methods_in_equal_time": methods.collect::<Vec<_>>(),
         "drawn_widths": study.widths,
     })
 }
@@ -126,6 +146,7 @@ fn errors(all: &[Errors]) -> Value {
     };
     json!({
         "line_coverage": mean(&|errors| errors.coverage),
+        "line_crossings": mean(&|errors| errors.crossings),
         "line_position": mean(&|errors| errors.position),
         "flip": regions(|errors| &errors.flip),
         "rmse": regions(|errors| &errors.rmse),

@@ -2,20 +2,18 @@
 
 use std::fmt::Write as _;
 
-use super::crops;
-use super::summary::{Fit, MEASURES, Mean, Measure, Point, STAGES, Spread, Summary};
-use super::svg::{Dot, Plot, Power, Series, bars, escape, number, shape};
-use super::widths;
-use crate::scene::settings::Sampler;
+use super::figures::{Figures, axis, dot, legend};
+use super::summary::{CROSSINGS, Fit, MEASURES, Mean, Measure, Point, STAGES, Spread, Summary};
+use super::svg::{Plot, Power, Series, bars, escape, number};
+use super::{crops, methods, samplers, widths};
 use crate::study::folder::Folder;
 use crate::study::ladder::Knob;
 use crate::study::measure::Errors;
 use crate::study::run::Study;
 
-/// What stratified sampling promises for edges.
-const IDEAL: f64 = -0.75;
-
-pub(super) fn page(study: &Study, summary: &Summary, folder: &Folder) -> String {
+/// The page, and its plots as files of their own.
+pub(super) fn page(study: &Study, summary: &Summary, folder: &Folder) -> (String, Figures) {
+    let mut figures = Figures::default();
     let title = escape(&study.title);
     let mut html = format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
@@ -25,16 +23,17 @@ pub(super) fn page(study: &Study, summary: &Summary, folder: &Folder) -> String 
     );
     let parts = [
         head(study, summary),
-        plots(study, summary),
-        samplers(study, summary),
-        widths::section(&study.widths),
+        plots(study, summary, &mut figures),
+        methods::section(study, summary, &mut figures),
+        samplers::section(study, summary, &mut figures),
+        widths::section(&study.widths, &mut figures),
         presets(study, summary),
         costs(study, summary),
         pictures(study, summary, folder),
         tables(study, summary),
     ];
     html.extend(parts);
-    html + "</body>\n</html>\n"
+    (html + "</body>\n</html>\n", figures)
 }
 
 fn head(study: &Study, summary: &Summary) -> String {
@@ -81,24 +80,16 @@ fn is_ladder_of_samples(knob: Knob) -> bool {
     matches!(knob, Knob::Samples | Knob::IdealSamples)
 }
 
-fn plots(study: &Study, summary: &Summary) -> String {
+fn plots(study: &Study, summary: &Summary, figures: &mut Figures) -> String {
     let mut html = "<h2>Error against time</h2>\n<p>CPU seconds of tracing, shading, lines and film, summed over threads (median of the \
                     repeats). Whiskers: least and greatest error. Dots: the front of what nothing beats in both. \
-                    Solid: the fitted power of the samples; dashed: the ideal N<sup>−0.75</sup> of stratified sampling at edges. \
+                    Solid: the fitted power of the samples; dashed: the ideal N<sup>−0.75</sup> of stratified sampling at edges (FLIP \
+                    takes roots of differences, so it has none). \
                     Where the samples' curve levels off, what is left is not noise but an approximation that the scene \
                     makes; <i>ideal_samples</i> has none.</p>\n"
         .to_owned();
-    html.push_str("<ul class=\"legend\">");
-    for rungs in &study.ladder.knobs {
-        let kind = kind(rungs.knob);
-        let _ = write!(
-            html,
-            "<li><svg viewBox=\"-8 -6 16 12\"><path class=\"dot k{kind}\" d=\"{}\"/></svg>{}</li>",
-            shape(kind),
-            rungs.knob.name()
-        );
-    }
-    html.push_str("</ul>\n<div class=\"two\">\n");
+    html += &legend(study.ladder.knobs.iter().map(|rungs| (kind(rungs.knob), rungs.knob.name().to_owned())));
+    html.push_str("<div class=\"two\">\n");
     for measure in &MEASURES {
         let fit = summary.fit(study, Knob::Samples, measure);
         let plot = plot(study, summary, measure, fit);
@@ -117,37 +108,28 @@ fn plots(study: &Study, summary: &Summary) -> String {
         if study.ladder.knobs.iter().any(|rungs| rungs.knob == Knob::IdealSamples) {
             tell("ideal samples", summary.fit(study, Knob::IdealSamples, measure));
         }
-        let _ = writeln!(html, "<figure>{}<figcaption>{}</figcaption></figure>", plot.svg(), caption.join(" · "));
+        html += &figures.add(measure.name.to_owned(), &plot, &caption.join(" · "));
     }
     html + "</div>\n"
 }
 
 fn plot<'a>(study: &Study, summary: &Summary, measure: &'a Measure, fit: Option<Fit>) -> Plot<'a> {
-    let dot = |point: &Point, knob: Knob| {
-        let values: Vec<f64> = point.errors.iter().filter_map(measure.of).collect();
-        let mean = Mean::of(&values)?.mean;
-        let spread = Spread::of(values);
-        let value = point.settings.value(knob);
-        Some(Dot {
-            at: [point.cpu.median, mean],
-            reach: [spread.least, spread.greatest],
-            name: format!("{}: {} s, {}", point.name, number(point.cpu.median), number(mean)),
-            label: (knob == Knob::Samples || (knob == Knob::Method && point.index > 0)).then_some(value),
-        })
-        .filter(|dot| dot.at.iter().all(|value| *value > 0.0))
-    };
     let series: Vec<Series> = study
         .ladder
         .knobs
         .iter()
         .map(|rungs| Series {
             kind: kind(rungs.knob),
+            name: rungs.knob.name().to_owned(),
             // The scene itself is on every ladder; it is drawn once.
             dots: summary
                 .of_knob(study, rungs.knob)
                 .into_iter()
                 .filter(|point| point.index > 0 || rungs.knob == Knob::Samples)
-                .filter_map(|point| dot(point, rungs.knob))
+                .filter_map(|point| {
+                    let label = (rungs.knob == Knob::Samples).then(|| point.settings.value(rungs.knob));
+                    dot(point, measure, point.cpu.median, label)
+                })
                 .collect(),
             joined: is_ladder_of_samples(rungs.knob),
             faint: false,
@@ -162,20 +144,19 @@ fn plot<'a>(study: &Study, summary: &Summary, measure: &'a Measure, fit: Option<
         let (slope, at_one) = (fit.by_seconds, fit.at_one_second);
         powers.push(Power { class: "fit", slope, at_one, from, name: format!("fitted: seconds^{slope:.2}") });
         // The ideal begins where the fit does.
-        let ideal = at_one * libm::pow(ends.least, slope - IDEAL);
-        powers.push(Power {
+        powers.extend(measure.ideal.map(|ideal| Power {
             class: "ideal",
-            slope: IDEAL,
-            at_one: ideal,
+            slope: ideal,
+            at_one: at_one * libm::pow(ends.least, slope - ideal),
             from,
-            name: format!("ideal: seconds^{IDEAL}"),
-        });
+            name: format!("ideal: seconds^{ideal}"),
+        }));
     }
     let corner = |point: &&Point| Some([point.cpu.median, point.error(measure.of)?.mean]);
     Plot {
         title: measure.title,
         x: "CPU seconds",
-        y: format!("{} ({})", measure.title, measure.unit),
+        y: axis(measure),
         series,
         powers,
         front: summary.front(measure).iter().filter_map(corner).filter(|[_, error]| *error > 0.0).collect(),
@@ -209,119 +190,45 @@ fn presets(study: &Study, summary: &Summary) -> String {
     )
 }
 
-/// Errors of each sampler against samples.
-fn samplers(study: &Study, summary: &Summary) -> String {
-    let points = summary.of_knob(study, Knob::Sampler);
-    if points.is_empty() {
-        return String::new();
-    }
-    let mut html =
-        "<h2>Samplers</h2>\n<p>The same errors by how samples are spread over the pixels, against samples per pixel. \
-                    Dashed: the ideal N<sup>−0.75</sup>.</p>\n<ul class=\"legend\">"
-            .to_owned();
-    for (kind, sampler) in Sampler::ALL.into_iter().enumerate() {
-        let path = shape(kind);
-        let _ = write!(
-            html,
-            "<li><svg viewBox=\"-8 -6 16 12\"><path class=\"dot k{kind}\" d=\"{path}\"/></svg>{}</li>",
-            sampler.name()
-        );
-    }
-    html.push_str("</ul>\n<div class=\"two\">\n");
-    for measure in &MEASURES {
-        let dot = |point: &&Point| {
-            let values: Vec<f64> = point.errors.iter().filter_map(measure.of).collect();
-            let mean = Mean::of(&values)?.mean;
-            let spread = Spread::of(values);
-            let name = format!("{}: {}", point.settings.value(Knob::Sampler), number(mean));
-            let at = [f64::from(point.settings.samples), mean];
-            (mean > 0.0).then_some(Dot { at, reach: [spread.least, spread.greatest], name, label: None })
-        };
-        let series = Sampler::ALL.into_iter().enumerate().map(|(kind, sampler)| {
-            let own = points.iter().filter(|point| point.settings.sampler == sampler);
-            Series { kind, dots: own.filter_map(dot).collect(), joined: true, faint: false }
-        });
-        let series: Vec<Series> = series.collect();
-        let Some(first) = series.iter().find_map(|series| series.dots.first()) else { continue };
-        let [least, most] = [0, 1].map(|end| {
-            let counts = points.iter().map(|point| f64::from(point.settings.samples));
-            if end == 0 { counts.fold(f64::INFINITY, f64::min) } else { counts.fold(0.0, f64::max) }
-        });
-        let ideal = Power {
-            class: "ideal",
-            slope: IDEAL,
-            at_one: first.at[1] * libm::pow(first.at[0], -IDEAL),
-            from: [least, most],
-            name: format!("ideal: samples^{IDEAL}"),
-        };
-        let plot = Plot {
-            title: measure.title,
-            x: "samples per pixel",
-            y: format!("{} ({})", measure.title, measure.unit),
-            series,
-            powers: vec![ideal],
-            front: Vec::new(),
-            floor: (measure.of)(&study.own).filter(|floor| *floor > 0.0),
-            least: None,
-        };
-        let fits = summary.sampler_fits(study, measure).into_iter().filter_map(|(sampler, fit)| {
-            let fit = fit?;
-            Some(format!("{}: N<sup>{:.2}</sup>", sampler.name(), fit.by_samples))
-        });
-        let caption: Vec<_> = std::iter::once(format!("<b>{}</b>", measure.title)).chain(fits).collect();
-        let _ = writeln!(html, "<figure>{}<figcaption>{}</figcaption></figure>", plot.svg(), caption.join(" · "));
-    }
-    html + "</div>\n"
-}
-
 fn costs(study: &Study, summary: &Summary) -> String {
-    let mut html = "<h2>Cost by stage</h2>\n<ul class=\"legend\">".to_owned();
-    for (i, stage) in STAGES.iter().enumerate() {
-        let _ = write!(
-            html,
-            "<li><svg viewBox=\"0 0 16 12\"><rect class=\"s{i}\" width=\"12\" height=\"12\"/></svg>{stage}</li>"
-        );
-    }
-    html.push_str("</ul>\n<div class=\"two\">\n");
-    let samples: Vec<&Point> = summary.of_knob(study, Knob::Samples);
-    let others: Vec<&Point> = summary
-        .points
-        .iter()
-        .filter(|point| point.index == 0 || point.settings.samples == study.ladder.points[0].samples)
-        .collect();
-    let stages =
-        |points: &[&Point]| points.iter().map(|point| (point.name.clone(), point.stages.to_vec())).collect::<Vec<_>>();
-    let bytes = |points: &[&Point]| {
-        points.iter().map(|point| (point.name.clone(), vec![0.0, point.bytes_per_sample])).collect::<Vec<_>>()
-    };
-    for (points, caption) in [(&samples, "by samples"), (&others, "by everything else, at the scene's samples")] {
-        let plot = bars("cost by stage", &stages(points), "s");
-        let _ = writeln!(html, "<figure>{plot}<figcaption>CPU seconds, {caption}</figcaption></figure>");
-    }
-    html.push_str("</div>\n<h2>Memory</h2>\n<div class=\"two\">\n");
-    for (points, caption) in [(&samples, "by samples"), (&others, "by everything else")] {
-        let plot = bars("memory", &bytes(points), "B");
-        let _ = writeln!(
-            html,
-            "<figure>{plot}<figcaption>Bytes that a sample takes while its tile is in memory, with what the line search prepares, \
-             {caption}</figcaption></figure>"
-        );
-    }
-    let peaks = |points: &[&Point]| {
-        let of = |point: &&Point| Some((point.name.clone(), vec![0.0, 0.0, point.peak? / f64::from(1 << 20)]));
-        points.iter().filter_map(of).collect::<Vec<_>>()
-    };
-    for (points, caption) in [(&samples, "by samples"), (&others, "by everything else")] {
-        let peaks = peaks(points);
-        if !peaks.is_empty() {
-            let plot = bars("peak memory", &peaks, "MiB");
-            let _ = writeln!(
-                html,
-                "<figure>{plot}<figcaption>Most memory that the process held, scene and reference included, {caption}</figcaption></figure>"
-            );
+    let samples = summary.of_knob(study, Knob::Samples);
+    let is_other = |point: &&Point| point.index == 0 || point.settings.samples == study.ladder.points[0].samples;
+    let others = summary.points.iter().filter(is_other).collect();
+    let ladders: [(Vec<&Point>, _); 2] =
+        [(samples, "by samples"), (others, "by everything else, at the scene's samples")];
+    let figures = |caption: &str, unit: &str, parts: &dyn Fn(&Point) -> Option<Vec<f64>>| {
+        let mut html = String::new();
+        for (points, of) in &ladders {
+            let rows: Vec<_> = points.iter().filter_map(|point| Some((point.name.clone(), parts(point)?))).collect();
+            if rows.len() > 1 {
+                let plot = bars(caption, &rows, unit);
+                let _ = writeln!(html, "<figure>{plot}<figcaption>{caption}, {of}</figcaption></figure>");
+            }
         }
-    }
-    html + "</div>\n"
+        html
+    };
+    let stages: String = STAGES
+        .iter()
+        .enumerate()
+        .map(|(i, stage)| {
+            let rect = format!("<rect class=\"s{i}\" width=\"12\" height=\"12\"/>");
+            format!("<li><svg viewBox=\"0 0 16 12\">{rect}</svg>{stage}</li>")
+        })
+        .collect();
+    format!(
+        "<h2>Cost by stage</h2>\n<p><i>Build</i> makes the hierarchies over all triangles. It takes the same for every picture, and the seconds of all \
+         other plots are without it.</p>\n<ul class=\"legend\">{stages}</ul>\n<div class=\"two\">\n{}</div>\n\
+         <h2>Memory</h2>\n<div class=\"two\">\n{}{}</div>\n",
+        figures("CPU seconds", "s", &|point| Some(point.stages.to_vec())),
+        figures(
+            "Bytes that a sample takes while its tile is in memory, with what the line search prepares",
+            "B",
+            &|point| { Some(vec![0.0, point.bytes_per_sample]) }
+        ),
+        figures("Most memory that the process held, scene and reference included", "MiB", &|point| {
+            Some(vec![0.0, 0.0, point.peak? / f64::from(1 << 20)])
+        }),
+    )
 }
 
 fn pictures(study: &Study, summary: &Summary, folder: &Folder) -> String {
@@ -393,7 +300,7 @@ fn tables(study: &Study, summary: &Summary) -> String {
     let mut html = "<h2>All numbers</h2>\n<p>Seconds are medians, with least and greatest; errors are means, with the standard deviation \
                     over seeds. Coverage: which share of the lines' area is wrong. Position: how far lines are from their places, in \
                     pixels.</p>\n<div class=\"wide\"><table>\n<thead><tr><th>setting</th><th>runs</th><th>wall, s</th><th>CPU, s</th>\
-                    <th>bytes/sample</th><th>peak, MiB</th><th>coverage</th><th>position, px</th><th>FLIP</th><th>RMSE</th></tr></thead>\n<tbody>\n"
+                    <th>bytes/sample</th><th>peak, MiB</th><th>coverage</th><th>where lines meet</th><th>position, px</th><th>FLIP</th><th>RMSE</th></tr></thead>\n<tbody>\n"
         .to_owned();
     rows(&mut html, study, summary, |point| {
         let spread = |spread: Spread| {
@@ -403,7 +310,8 @@ fn tables(study: &Study, summary: &Summary) -> String {
         let mut cells =
             vec![point.runs.to_string(), spread(point.wall), spread(point.cpu), number(point.bytes_per_sample)];
         cells.push(point.peak.map_or_else(|| "–".to_owned(), |peak| number(peak / f64::from(1 << 20))));
-        cells.extend(MEASURES.iter().map(|measure| cell(point.error(measure.of))));
+        let [coverage, position, flip, rmse] = MEASURES.map(|measure| cell(point.error(measure.of)));
+        cells.extend([coverage, cell(point.error(CROSSINGS.of)), position, flip, rmse]);
         cells
     });
     html.push_str(
@@ -437,7 +345,7 @@ fn cell(mean: Option<Mean>) -> String {
 
 fn rows(html: &mut String, study: &Study, summary: &Summary, cells: impl Fn(&Point) -> Vec<String>) {
     for rungs in &study.ladder.knobs {
-        let _ = writeln!(html, "<tr class=\"group\"><td colspan=\"10\">{}</td></tr>", rungs.knob.name());
+        let _ = writeln!(html, "<tr class=\"group\"><td colspan=\"11\">{}</td></tr>", rungs.knob.name());
         for point in summary.of_knob(study, rungs.knob) {
             let class = if point.index == 0 { " class=\"own\"" } else { "" };
             let cells: String = cells(point).iter().map(|cell| format!("<td>{cell}</td>")).collect();

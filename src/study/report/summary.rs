@@ -2,8 +2,9 @@
 
 use serde::Serialize;
 
+use crate::line::Method;
 use crate::scene::settings::Sampler;
-use crate::study::ladder::{Knob, Settings};
+use crate::study::ladder::{Knob, METHODS, Settings};
 use crate::study::measure::Errors;
 use crate::study::run::Study;
 use crate::study::table::Run;
@@ -17,9 +18,23 @@ pub struct Measure {
     pub title: &'static str,
     /// What the numbers mean.
     pub unit: &'static str,
+    /// The power of the samples by which stratified sampling promises it to fall at edges.
+    pub ideal: Option<f64>,
     /// Its value among all errors.
-    pub of: fn(&Errors) -> Option<f64>,
+    pub of: Error,
 }
+
+/// One of the errors of a picture, if it has one.
+pub type Error = fn(&Errors) -> Option<f64>;
+
+/// The coverage error where lines meet: not of all pictures, and so none of [`MEASURES`].
+pub const CROSSINGS: Measure = Measure {
+    name: "line_crossings",
+    title: "Coverage error where lines meet",
+    unit: "share of their area",
+    ideal: Some(-0.75),
+    of: |errors| errors.crossings,
+};
 
 /// The errors of the whole picture, the most telling about lines first.
 pub const MEASURES: [Measure; 4] = [
@@ -27,11 +42,24 @@ pub const MEASURES: [Measure; 4] = [
         name: "line_coverage",
         title: "Line coverage error",
         unit: "share of the lines' area",
+        ideal: Some(-0.75),
         of: |errors| errors.coverage,
     },
-    Measure { name: "line_position", title: "Line position error", unit: "pixels", of: |errors| errors.position },
-    Measure { name: "flip", title: "FLIP", unit: "mean, 0 to 1", of: |errors| Some(errors.flip.all) },
-    Measure { name: "rmse", title: "RMSE", unit: "linear colours, 0 to 1", of: |errors| Some(errors.rmse.all) },
+    Measure {
+        name: "line_position",
+        title: "Line position error",
+        unit: "pixels",
+        ideal: Some(-0.75),
+        of: |errors| errors.position,
+    },
+    Measure { name: "flip", title: "FLIP", unit: "mean, 0 to 1", ideal: None, of: |errors| Some(errors.flip.all) },
+    Measure {
+        name: "rmse",
+        title: "RMSE",
+        unit: "linear colours, 0 to 1",
+        ideal: Some(-0.75),
+        of: |errors| Some(errors.rmse.all),
+    },
 ];
 
 /// The middle of several numbers, and how far they reach.
@@ -154,6 +182,17 @@ pub struct Fit {
     pub points: usize,
 }
 
+/// Errors of all methods in one time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EqualTime {
+    /// With how many samples the exact search takes it.
+    pub samples: u32,
+    /// CPU seconds.
+    pub seconds: f64,
+    /// By measure, and by method in the order of [`METHODS`]; `None` where a ladder does not reach there.
+    pub errors: Vec<[Option<f64>; METHODS.len()]>,
+}
+
 /// What a study comes to.
 #[derive(Clone, Debug)]
 pub struct Summary {
@@ -196,15 +235,61 @@ impl Summary {
         Sampler::ALL.into_iter().map(|sampler| (sampler, fitted(&of(sampler), study, measure))).collect()
     }
 
+    /// The points of a method, by rising time: those of its ladder, and of the ladder of samples, which is that of the exact search, too.
+    #[must_use]
+    pub fn of_method(&self, study: &Study, method: Method) -> Vec<&Point> {
+        let mut points = self.of_knob(study, Knob::Method);
+        points.extend(self.of_knob(study, Knob::Samples));
+        points.retain(|point| point.settings.method == method);
+        points.sort_by_key(|point| point.index);
+        points.dedup_by_key(|point| point.index);
+        points.sort_by(|a, b| a.cpu.median.total_cmp(&b.cpu.median));
+        points
+    }
+
+    /// What each method comes to in the time that the exact search takes with each of its rates.
+    #[must_use]
+    pub fn equal_times(&self, study: &Study, measures: &[Measure]) -> Vec<EqualTime> {
+        let at = |point: &Point| {
+            let seconds = point.cpu.median;
+            let error = |measure: &Measure| METHODS.map(|method| self.at_time(study, method, measure.of, seconds));
+            EqualTime { samples: point.settings.samples, seconds, errors: measures.iter().map(error).collect() }
+        };
+        let times = self.of_method(study, Method::Exact).into_iter().map(at);
+        // Where the exact search stands alone there is nothing to compare.
+        times.filter(|time| time.errors.iter().any(|errors| errors[1..].iter().any(Option::is_some))).collect()
+    }
+
+    /// The error of a method in a number of CPU seconds: between the two points of its ladder that take less and more, logarithms are
+    /// taken for straight. `None` if the ladder does not reach there.
+    #[must_use]
+    pub fn at_time(&self, study: &Study, method: Method, of: Error, seconds: f64) -> Option<f64> {
+        let points = self.of_method(study, method);
+        let known = points.iter().filter_map(|point| Some([point.cpu.median, point.error(of)?.mean]));
+        between(&known.filter(|[seconds, error]| *seconds > 0.0 && *error > 0.0).collect::<Vec<_>>(), seconds)
+    }
+
     /// How far a point lies behind the front: the largest factor by which another point is both faster and nearer to the
     /// reference. At most 1 if it is on the front; infinite if it was not measured.
     #[must_use]
     pub fn behind_front(&self, index: usize, measure: &Measure) -> f64 {
+        if self.point(index).is_none_or(|point| point.error(measure.of).is_none()) {
+            return f64::INFINITY;
+        }
+        self.rival(index, measure).map_or(0.0, |(_, factor)| factor)
+    }
+
+    /// The point that beats another by the largest factor in both time and error, and the factor, which is below 1 if none does.
+    #[must_use]
+    pub fn rival(&self, index: usize, measure: &Measure) -> Option<(&Point, f64)> {
         let figures = |point: &Point| Some([point.cpu.median, point.error(measure.of)?.mean]);
-        let own = self.points.iter().find(|point| point.index == index).and_then(figures);
-        let Some([seconds, error]) = own else { return f64::INFINITY };
-        let others = self.points.iter().filter(|point| point.index != index).filter_map(figures);
-        others.map(|other| (seconds / other[0]).min(error / other[1])).fold(0.0, f64::max)
+        let [seconds, error] = self.point(index).and_then(figures)?;
+        let others = self.points.iter().filter(|point| point.index != index);
+        let factors = others.filter_map(|other| {
+            let found = figures(other)?;
+            Some((other, (seconds / found[0]).min(error / found[1])))
+        });
+        factors.max_by(|a, b| a.1.total_cmp(&b.1))
     }
 
     /// The points that no other beats in both time and error, by rising time.
@@ -221,6 +306,14 @@ impl Summary {
         });
         points
     }
+}
+
+/// The power law between the two of some rising points that lie around x.
+fn between(points: &[[f64; 2]], x: f64) -> Option<f64> {
+    let pair = points.windows(2).find(|pair| (pair[0][0]..=pair[1][0]).contains(&x))?;
+    let [[x0, y0], [x1, y1]] = [pair[0], pair[1]].map(|point| point.map(libm::log));
+    let share = if x1 > x0 { (libm::log(x) - x0) / (x1 - x0) } else { 0.0 };
+    Some(libm::exp(y0 + share * (y1 - y0)))
 }
 
 /// How an error falls over points of rising samples.
@@ -260,6 +353,14 @@ mod tests {
         assert_eq!(spread, Spread { median: 2.5, least: 1.0, greatest: 10.0 });
         assert_eq!(Spread::of(vec![]), Spread::default());
         assert_eq!(Mean::of(&[1.0, 3.0]), Some(Mean { mean: 2.0, deviation: 2.0_f64.sqrt() }));
+        let points = [[1.0, 8.0], [4.0, 2.0], [16.0, 1.0]];
+        let found = [0.5, 1.0, 2.0, 4.0, 8.0, 17.0].map(|x| between(&points, x));
+        for (found, expected) in
+            found.into_iter().zip([None, Some(8.0), Some(4.0), Some(2.0), Some(2.0_f64.sqrt()), None])
+        {
+            assert_eq!(found.is_some(), expected.is_some());
+            assert!((found.unwrap_or_default() - expected.unwrap_or_default()).abs() < 1e-12, "{found:?}");
+        }
         assert_eq!((Mean::of(&[]), Mean::of(&[5.0])), (None, Some(Mean { mean: 5.0, deviation: 0.0 })));
     }
 }

@@ -21,6 +21,8 @@ pub struct Dot {
 pub struct Series {
     /// Number of the colour and the shape.
     pub kind: usize,
+    /// What they are, for the legend of a plot that stands alone; empty for none.
+    pub name: String,
     /// The dots.
     pub dots: Vec<Dot>,
     /// Whether a line joins them.
@@ -138,9 +140,53 @@ impl Axis {
 }
 
 impl Plot<'_> {
+    /// The plot as a file of its own: with a legend, and colours that follow the reader's choice of dark or light.
+    #[must_use]
+    pub fn document(&self) -> String {
+        const ROW: f64 = 18.0;
+        let (mut legend, mut x, mut y) = (String::new(), LEFT, 16.0);
+        let named = self.series.iter().filter(|series| !series.name.is_empty() && !series.dots.is_empty());
+        let mut series: Vec<_> = named.collect();
+        series.sort_by_key(|series| series.kind);
+        for Series { kind, name, .. } in series {
+            // As wide as most letters are.
+            let width = 24.0 + 6.6 * name.chars().count() as f64;
+            if x + width > WIDTH {
+                (x, y) = (LEFT, y + ROW);
+            }
+            let _ = write!(
+                legend,
+                "<path class=\"dot k{kind}\" transform=\"translate({:.1} {:.1})\" d=\"{}\"/><text x=\"{:.1}\" y=\"{y:.1}\">{}</text>",
+                x + 5.0,
+                y - 4.0,
+                shape(*kind),
+                x + 14.0,
+                escape(name)
+            );
+            x += width;
+        }
+        let top = y + 8.0;
+        let height = HEIGHT + top;
+        format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" style=\"width:{WIDTH}px;height:{height}px\" viewBox=\"0 0 {WIDTH} {height}\">\n\
+             <style>\n{}</style>\n<rect width=\"100%\" height=\"100%\" fill=\"var(--page)\"/>\n{legend}\n\
+             <g transform=\"translate(0 {top})\">\n{}</g>\n</svg>\n",
+            include_str!("style.css"),
+            self.body()
+        )
+    }
+
     /// The plot as an `svg` element.
     #[must_use]
     pub fn svg(&self) -> String {
+        format!(
+            "<svg class=\"plot\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\" aria-label=\"{}\">\n{}</svg>",
+            escape(self.title),
+            self.body()
+        )
+    }
+
+    fn body(&self) -> String {
         let dots = || self.series.iter().flat_map(|series| &series.dots);
         let x = Axis::new(dots().map(|dot| dot.at[0]), LEFT, WIDTH - RIGHT);
         // A floor far below all dots is not worth the room.
@@ -149,10 +195,7 @@ impl Plot<'_> {
         let lowest = self.least.unwrap_or(0.0);
         let shown = dots().flat_map(|dot| [dot.at[1], dot.reach[1]]).chain(floor).map(|value| value.max(lowest));
         let y = Axis::new(shown, HEIGHT - BOTTOM, TOP);
-        let mut svg = format!(
-            "<svg class=\"plot\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\" aria-label=\"{}\">\n",
-            escape(self.title)
-        );
+        let mut svg = String::new();
         let mut put = |text: String| {
             svg.push_str(&text);
             svg.push('\n');
@@ -263,7 +306,7 @@ impl Plot<'_> {
                 }
             }
         }
-        svg + "</svg>"
+        svg
     }
 }
 
@@ -335,7 +378,7 @@ mod tests {
     #[test]
     fn plots_of_nothing_and_of_one_dot_are_plots() {
         let plot = |dots: Vec<Dot>| {
-            let series = vec![Series { kind: 0, dots, joined: true, faint: false }];
+            let series = vec![Series { kind: 0, name: String::new(), dots, joined: true, faint: false }];
             let (powers, front) = (vec![], vec![]);
             Plot { title: "t", x: "x", y: "y".into(), series, powers, front, floor: Some(1e-9), least: None }.svg()
         };

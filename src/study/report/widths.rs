@@ -2,7 +2,8 @@
 
 use std::fmt::Write as _;
 
-use super::svg::{Dot, Plot, Power, Series, number, shape};
+use super::figures::{Figures, legend};
+use super::svg::{Dot, Plot, Power, Series, number};
 use crate::scene::settings::Sampler;
 use crate::study::width::{Asked, Drawn, Edge, SAMPLES, WIDTHS};
 
@@ -10,7 +11,7 @@ use crate::study::width::{Asked, Drawn, Edge, SAMPLES, WIDTHS};
 const LEAST: f64 = 0.3;
 
 /// Drawn against asked widths; nothing if none were measured.
-pub(super) fn section(widths: &[Drawn]) -> String {
+pub(super) fn section(widths: &[Drawn], figures: &mut Figures) -> String {
     if widths.is_empty() {
         return String::new();
     }
@@ -18,28 +19,24 @@ pub(super) fn section(widths: &[Drawn]) -> String {
         "<h2>Drawn against asked width</h2>\n<p>How wide a line is on average that is asked to have a width: the area that is drawn, as a \
          part of the area that was asked for. Only the edge, the sampler and the number of samples matter, not the scene. Hollow and dashed: the \
          paper's rule, which measures to the nearest <i>sample</i> across the edge and so draws too thin; filled: with \
-         <i>width_compensation</i>, which is made for straight edges. Below {} % is left out of the plots.</p>\n<ul class=\"legend\">",
+         <i>width_compensation</i>, which is made for straight edges. Below {} % is left out of the plots.</p>\n",
         number(100.0 * LEAST)
     );
-    for (kind, samples) in SAMPLES.into_iter().enumerate() {
-        let _ = write!(
-            html,
-            "<li><svg viewBox=\"-8 -6 16 12\"><path class=\"dot k{kind}\" d=\"{}\"/></svg>{samples} sample{}</li>",
-            shape(kind),
-            if samples == 1 { "" } else { "s" }
-        );
-    }
-    html.push_str("</ul>\n");
+    html += &legend(SAMPLES.map(rate).into_iter().enumerate());
     for edge in Edge::ALL {
         let _ = write!(html, "<h3>{}</h3>\n<div class=\"three\">\n", edge.name());
         for sampler in Sampler::ALL {
-            let plot = plot(widths, edge, sampler).svg();
-            let _ = writeln!(html, "<figure>{plot}<figcaption>{}</figcaption></figure>", sampler.name());
+            let plot = plot(widths, edge, sampler);
+            html += &figures.add(format!("widths_{}_{}", edge.file_name(), sampler.name()), &plot, sampler.name());
         }
         html.push_str("</div>\n");
     }
     html.push_str(&table(widths));
     html
+}
+
+fn rate(samples: u32) -> String {
+    format!("{samples} sample{}", if samples == 1 { "" } else { "s" })
 }
 
 fn found(widths: &[Drawn], asked: &Asked) -> Option<f64> {
@@ -56,7 +53,8 @@ fn plot(widths: &[Drawn], edge: Edge, sampler: Sampler) -> Plot<'static> {
                 let at = [f64::from(width), share];
                 (share > 0.0).then_some(Dot { at, reach: [share; 2], name, label: None })
             });
-            Series { kind, dots: dots.collect(), joined: true, faint: !compensation }
+            let name = if compensation { rate(samples) } else { String::new() };
+            Series { kind, name, dots: dots.collect(), joined: true, faint: !compensation }
         })
     };
     let from = [f64::from(WIDTHS[0]), f64::from(WIDTHS[WIDTHS.len() - 1])];
@@ -105,16 +103,16 @@ mod tests {
 
     #[test]
     fn every_edge_and_sampler_has_a_plot_and_what_is_missing_a_dash() {
-        assert_eq!(section(&[]), "");
+        assert_eq!(section(&[], &mut Figures::default()), "");
         let drawn = |asked: Asked| Drawn { version: String::new(), drawn: 0.9 * f64::from(asked.width), asked };
         let mut widths: Vec<_> = all().into_iter().map(drawn).collect();
-        let whole = section(&widths);
+        let whole = section(&widths, &mut Figures::default());
         assert_eq!(whole.matches("<svg class=\"plot\"").count(), Edge::ALL.len() * Sampler::ALL.len());
         assert_eq!(whole.matches("0.900 <span class=\"soft\">(0.900)</span>").count(), all().len() / 2);
         // At one sample nothing may be drawn at all.
         widths[0].drawn = 0.0;
         widths.truncate(100);
-        let part = section(&widths);
+        let part = section(&widths, &mut Figures::default());
         assert!(part.contains("– <span") && part.contains("(0.000)") && !part.contains("NaN") && !part.contains("inf"));
     }
 }
