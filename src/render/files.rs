@@ -46,8 +46,11 @@ pub fn render_files(
     control: &Control<'_>,
 ) -> Result<Report, Diagnostic> {
     let settings = scene.render();
-    let samples = ("samples", settings.samples.to_string());
-    into_files(settings, &plan.layers, files, options.crop, samples, |emit| {
+    let mut facts = vec![("samples", settings.samples.to_string())];
+    if plan.oversampling.is_some() {
+        facts.push(("line_oversampling", settings.line_oversampling.to_string()));
+    }
+    into_files(settings, &plan.layers, files, options.crop, &facts, |emit| {
         render(scene, shaders, plan, options, control, emit)
     })
 }
@@ -66,25 +69,25 @@ pub fn render_files_to_error(
     options: &RenderOptions,
     control: &Control<'_>,
 ) -> Result<Report, Diagnostic> {
-    let error = ("error", goal.error.to_string());
-    into_files(scene.render(), &plan.layers, files, options.crop, error, |emit| {
+    let facts = [("error", goal.error.to_string())];
+    into_files(scene.render(), &plan.layers, files, options.crop, &facts, |emit| {
         render_to_error(scene, shaders, plan, goal, options, control, emit)
     })
 }
 
-/// Lets some work write its tiles of these layers into files; `fact` goes into their headers.
+/// Lets some work write its tiles of these layers into files; `facts` go into their headers.
 fn into_files(
     settings: &RenderSettings,
     layers: &[Layer],
     files: &[PictureFile],
     crop: Option<PixelRect>,
-    fact: (&str, String),
+    facts: &[(&str, String)],
     work: impl FnOnce(Emit<'_>) -> Result<Report, Diagnostic>,
 ) -> Result<Report, Diagnostic> {
     let start = Instant::now();
     let picture = PixelRect::of_size(settings.size);
     let crop = crop.map_or(picture, |crop| crop.intersection(&picture));
-    let open = |file| Part::open(settings, layers, file, crop, &fact);
+    let open = |file| Part::open(settings, layers, file, crop, facts);
     let outputs = files.iter().map(open).collect::<Result<Vec<_>, _>>()?;
     let begun = AtomicBool::new(false);
     let mut report = work(&|tile| {
@@ -114,7 +117,7 @@ pub fn write_picture(
     channels: &[Vec<f32>],
 ) -> Result<(), Diagnostic> {
     let whole = PixelRect::of_size(settings.size);
-    let part = Part::open(settings, layers, file, whole, &("samples", settings.samples.to_string()))?;
+    let part = Part::open(settings, layers, file, whole, &[("samples", settings.samples.to_string())])?;
     part.output.write(&part.of(whole, channels))?;
     part.output.finish()
 }
@@ -131,7 +134,7 @@ impl Part {
         layers: &[Layer],
         file: &PictureFile,
         crop: PixelRect,
-        (name, value): &(&str, String),
+        facts: &[(&str, String)],
     ) -> Result<Self, Diagnostic> {
         let mut channels = Vec::new();
         for layer in &file.layers {
@@ -141,6 +144,8 @@ impl Part {
             let first: usize = layers[..place].iter().map(|known| known.channels().len()).sum();
             channels.extend(first..first + layer.channels().len());
         }
+        let seed = ("seed", settings.seed.to_string());
+        let facts = facts.iter().chain([&seed]).map(|(name, value)| ((*name).to_owned(), value.clone()));
         let output = Output::create(OutputSettings {
             path: file.path.clone(),
             size: settings.size,
@@ -148,7 +153,7 @@ impl Part {
             layers: file.layers.clone(),
             png_layer: file.layers.first().cloned().unwrap_or(Layer::Rgba),
             transparent: settings.background == Background::Transparent,
-            metadata: vec![((*name).to_owned(), value.clone()), ("seed".to_owned(), settings.seed.to_string())],
+            metadata: facts.collect(),
         })?;
         Ok(Self { output, channels })
     }

@@ -183,11 +183,11 @@ pub fn study(
     // Drawn widths come last.
     let pictures = if options.widths && camera.truth.is_some() { 0.9 } else { 1.0 };
     let mut done = f64::from(samples);
-    let all = done + waiting.iter().map(|(point, _)| f64::from(ladder.points[*point].samples)).sum::<f64>();
+    let all = done + waiting.iter().map(|(point, _)| f64::from(ladder.points[*point].most_samples())).sum::<f64>();
     let (mut left_out, mut complete) = (0, true);
     for (point, repeat) in waiting {
         let settings = &ladder.points[point];
-        let expected = expected_seconds(&runs, settings.samples);
+        let expected = expected_seconds(&runs, settings.most_samples());
         let taken = if (point, repeat) == (0, 0) { first.take() } else { None };
         if taken.is_none()
             && deadline.is_some_and(|deadline| deadline.saturating_duration_since(Instant::now()) < seconds(expected))
@@ -206,7 +206,7 @@ pub fn study(
             folder.keep_picture(&ladder.name(point), &shot)?;
         }
         table::write(&folder.table(), &runs)?;
-        done += f64::from(settings.samples);
+        done += f64::from(settings.most_samples());
     }
     let measures_widths = options.widths && camera.truth.is_some();
     let widths = if measures_widths && complete {
