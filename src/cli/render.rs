@@ -130,7 +130,7 @@ fn render_request(
     if let Some(time) = time {
         // Before time goes into finding out what fits.
         request.files.iter().try_for_each(|file| check_writable(&file.path))?;
-        let chosen = choose_samples(&request.scene, &request.shaders, &layers, time, options, &control)?;
+        let chosen = choose_samples(&request.scene, &request.shaders, &request.files, time, options, &control)?;
         let chosen = *choice.insert(chosen.ok_or_else(stopped_early)?);
         request.scene = request.scene.with_samples(chosen.samples);
         request.plan = Plan::new(&request.scene, &request.shaders, &layers);
