@@ -24,6 +24,8 @@ const SCENE: &str = r#"
 size = [121, 75]
 samples = 4
 line_oversampling = 4
+# So that no two rates have the same bits anywhere.
+background = { bottom = [0.9, 0.8, 0.7], top = [0.4, 0.6, 0.7] }
 [camera]
 position = [0.0, 1.0, 9.0]
 target = [0.6, 0.4, 0.0]
@@ -42,7 +44,7 @@ translate = [0.4, 0.6, 0.0]
 radius = 0.6
 material = "mirror"
 [materials.ink]
-shader = "builtin:cel"
+shader = "builtin:default"
 [materials.mirror]
 shader = "builtin:mirror"
 "#;
@@ -89,8 +91,8 @@ fn every_block_is_that_of_the_picture_with_its_rate() {
     let mut lined = 0;
     for block in blocks(SIZE) {
         let has_ink = |picture: &Picture| block.iter().any(|(x, y)| picture.at(COVERAGE, *x, *y) > 0.0);
-        let is_high = same(&picture, &high, &block);
-        assert!(is_high || same(&picture, &low, &block), "the block of {:?} is of neither", block[0]);
+        let is_high = !same(&picture, &low, &block);
+        assert!(!is_high || same(&picture, &high, &block), "the block of {:?} is of neither", block[0]);
         // Nothing in this scene is so small that a pilot misses it.
         assert!(is_high || !has_ink(&high), "the block of {:?} has lines", block[0]);
         *pixels.entry(if is_high { 16 } else { 4 }).or_insert(0) += block.len() as u64;
@@ -134,9 +136,9 @@ fn rays_are_those_of_the_pilot_and_of_the_rates() {
     // Tiles of one pixel trace nothing but what is needed.
     let options = RenderOptions { tile: 1, ..RenderOptions::default() };
     let (picture, report) = render_with(&scene, &LAYERS, &options);
-    let high = picture_of(&scene.with_samples(16)).0;
+    let low = picture_of(&scene.with_samples(4)).0;
     let (shaders, _) = Shaders::compile(&scene, &Host::new()).unwrap_or_else(|faults| panic!("{faults}"));
-    let lined: Vec<_> = blocks(SIZE).into_iter().map(|block| (same(&picture, &high, &block), block)).collect();
+    let lined: Vec<_> = blocks(SIZE).into_iter().map(|block| (!same(&picture, &low, &block), block)).collect();
     let expected = |rate: u32, is_lined: bool| {
         let plan = Plan::new(&scene.with_samples(rate), &shaders, &LAYERS);
         let margin = plan.lines.as_ref().expect("there are lines").reach + plan.filter.reach();
@@ -217,15 +219,17 @@ fn mean_of(values: &[f64]) -> (f64, f64) {
 fn what_a_pilot_decides_is_right_on_average() {
     const LAYERS: [Layer; 2] = [Layer::Color, Layer::Line];
     let scene = crumbs();
-    let taken = |scene: &Scene| render_with(scene, &LAYERS, &RenderOptions::default()).0;
     let blocks = blocks([64, 48]);
     let truth = f64::from(SEGMENTS) / 2.0 * RADIUS * RADIUS * (std::f64::consts::TAU / f64::from(SEGMENTS)).sin();
     // Areas and line coverage: of the picture, of one whose own samples decide, and of plain ones of either rate.
     let (mut areas, mut hasty_areas) = (Vec::new(), Vec::new());
     let (mut lines, mut low_lines, mut high_lines, mut lined) = (Vec::new(), Vec::new(), Vec::new(), 0.0);
-    for seed in 0..150 {
+    for seed in 0..80 {
         let scene = scene.with_seed(seed);
-        let [own, low, high] = [scene.clone(), scene.with_samples(1), scene.with_samples(9)].map(|scene| taken(&scene));
+        let (own, report) = render_with(&scene, &LAYERS, &RenderOptions::default());
+        let [low, high] =
+            [1, 9].map(|rate| render_with(&scene.with_samples(rate), &LAYERS, &RenderOptions::default()).0);
+        lined += found(&report).lined_blocks as f64;
         for block in &blocks {
             let sum = |picture: &Picture, channel: usize| -> f64 {
                 block.iter().map(|(x, y)| f64::from(picture.at(channel, *x, *y))).sum()
@@ -237,7 +241,6 @@ fn what_a_pilot_decides_is_right_on_average() {
             lines.push(sum(&own, COVERAGE));
             low_lines.push(sum(&low, COVERAGE));
             high_lines.push(sum(&high, COVERAGE));
-            lined += f64::from(u8::from(same(&own, &high, block) && !same(&low, &high, block)));
         }
     }
     let share = lined / areas.len() as f64;
@@ -267,7 +270,7 @@ fn the_ink_of_declared_lines_is_as_much_as_it_should_be() {
     let plan = Plan::new(&scene, &shaders, &[Layer::Line]);
     let truth = coverage(scene.truth().expect("it declares lines"), scene.camera(), [160, 90], &plan.filter);
     let truth: f64 = truth.iter().map(|coverage| f64::from(*coverage)).sum();
-    let inks: Vec<f64> = (0..8)
+    let inks: Vec<f64> = (0..4)
         .map(|seed| {
             let (picture, report) = render_with(&scene.with_seed(seed), &[Layer::Line], &RenderOptions::default());
             assert!(found(&report).lined_blocks > 10);
@@ -319,11 +322,11 @@ fn a_place_is_explained_with_the_samples_that_it_has() {
     let scene = scene_from(SCENE);
     let (shaders, _) = Shaders::compile(&scene, &Host::new()).unwrap_or_else(|faults| panic!("{faults}"));
     let (picture, _) = picture_of(&scene);
-    let high = picture_of(&scene.with_samples(16)).0;
+    let low = picture_of(&scene.with_samples(4)).0;
     for block in blocks(SIZE).iter().step_by(3) {
         let (x, y) = block[block.len() / 2];
         let (explained, _) = why(&scene, &shaders, [x as f32, y as f32]).unwrap_or_else(|fault| panic!("{fault}"));
-        assert_eq!(explained.samples, if same(&picture, &high, block) { 16 } else { 4 }, "{x}, {y}");
+        assert_eq!(explained.samples, if same(&picture, &low, block) { 4 } else { 16 }, "{x}, {y}");
     }
 }
 
