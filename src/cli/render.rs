@@ -136,6 +136,8 @@ fn render_request(
         request.plan = Plan::new(&request.scene, &request.shaders, &layers);
     }
     if error.is_some() {
+        // It finds its own rates.
+        request.scene = request.scene.with_samples(request.scene.render().samples);
         request.plan = Plan::new(&request.scene, &request.shaders, &measured_layers(&layers));
     }
     let Request { scene, shaders, plan, files, .. } = request;

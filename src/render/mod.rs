@@ -91,7 +91,8 @@ pub struct Report {
 /// Takes finished tiles of the plan's layers: called from any thread, in any order, each pixel once.
 pub type Emit<'a> = &'a (dyn Fn(&FilmTile) -> Result<(), Diagnostic> + Sync);
 
-/// Renders a scene under its plan. Finished tiles of the plan's layers go to `emit`.
+/// Renders a scene under its plan, with more samples where lines are if that says so (see [`oversample`]). Finished tiles of the plan's
+/// layers go to `emit`.
 ///
 /// # Errors
 /// What `emit` returns, or that no threads could be started.

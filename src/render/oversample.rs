@@ -18,6 +18,12 @@
 //! plain pictures of either rate have there: where both are right on average, so is this. A block whose lines the pilot missed
 //! still gets `samples` samples that may find them. To keep the samples that decided would be wrong: small things that
 //! they missed would stay missing, those that they hit by luck would stay, and both would be looked at too rarely or too often.
+//!
+//! # What it takes
+//!
+//! The rates are rendered one after the other, each in blocks here and there. Samples are traced around them as far as lines and the
+//! pixel filter reach, at both rates where both meet. Picture files keep in memory, until the second rate comes, what of their own
+//! blocks is begun: 64 × 64 pixels, of which many may have both rates, so memory grows with the area of the picture.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
