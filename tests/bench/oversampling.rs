@@ -1,6 +1,6 @@
-//! What it buys to spend samples where lines are: `cargo bench --bench oversampling -- [--seeds N] [SCENE...]`.
+//! What it buys to spend samples where lines are: `cargo bench --bench oversampling -- [--seeds N] [--reference N] [--width N] [SCENE...]`.
 //!
-//! Renders scenes (or those named), 320 px wide, on one thread: with as many samples everywhere at many rates, with
+//! Renders scenes (or those named), 320 px wide unless they declare their lines, on one thread: with as many samples everywhere at many rates, with
 //! `line_oversampling`, and to an error (`--error`). Each picture is compared with the lines that the scene declares, else with one of
 //! 1024 samples; colours always with the latter. What plain sampling of the same CPU time would come to, and what plain sampling of the
 //! same error would take, is read off the plain rates by straight lines between their logarithms.
@@ -16,8 +16,6 @@ use tusche::scene::{Scene, SceneBuilder, file};
 use tusche::shade::{Host, Shaders};
 use tusche::study::truth::coverage;
 
-const WIDTH: u32 = 320;
-const REFERENCE: u32 = 1024;
 const SCENES: [&str; 4] = ["fig1_robot", "fig4_default", "truth_disc", "truth_edges"];
 const PLAIN: [u32; 8] = [4, 9, 16, 25, 36, 64, 100, 144];
 const OVERSAMPLED: [[u32; 2]; 8] = [[1, 4], [1, 16], [4, 4], [4, 9], [4, 16], [9, 4], [16, 4], [16, 9]];
@@ -32,13 +30,13 @@ fn main() {
     if !arguments.iter().any(|argument| argument == "--bench") {
         return;
     }
-    let seeds = arguments.iter().position(|argument| argument == "--seeds");
-    let count = seeds.and_then(|place| arguments.get(place + 1)?.parse().ok()).unwrap_or(2);
-    let named = arguments
-        .iter()
-        .enumerate()
-        .filter(|(place, argument)| !argument.starts_with("--") && seeds.is_none_or(|seeds| *place != seeds + 1));
-    let mut scenes: Vec<PathBuf> = named.map(|(_, argument)| PathBuf::from(argument)).collect();
+    let number = |name: &str, default: u32| {
+        let place = arguments.iter().position(|argument| argument == name);
+        place.and_then(|place| arguments.get(place + 1)?.parse().ok()).unwrap_or(default)
+    };
+    let effort = [number("--seeds", 2), number("--reference", 1024), number("--width", 320)];
+    let named = arguments.iter().filter(|argument| argument.ends_with(".toml"));
+    let mut scenes: Vec<PathBuf> = named.map(PathBuf::from).collect();
     if scenes.is_empty() {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
         scenes.extend(SCENES.map(|name| folder.join(name).with_extension("toml")));
@@ -49,7 +47,7 @@ fn main() {
     );
     println!("|---|---|---|---|---|---|---|---|---|---|---|---|");
     for path in scenes {
-        measure(&path, count);
+        measure(&path, effort);
     }
 }
 
@@ -62,16 +60,16 @@ struct Cost {
     rmse: f64,
 }
 
-fn measure(path: &Path, seeds: u64) {
+fn measure(path: &Path, [seeds, reference, wide]: [u32; 3]) {
     let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let (mut builder, _) = file::load(path, &FileStore::new(), &[], &file::LoadOptions::default())
         .unwrap_or_else(|faults| panic!("{faults}"));
     let [width, height] = builder.render.size;
     // Declared lines are those of the scene's own size.
     if builder.truth.is_none() {
-        builder.render.size = [WIDTH, (WIDTH * height / width).max(1)];
+        builder.render.size = [wide, (wide * height / width).max(1)];
     }
-    let scene = built(&builder, REFERENCE, 1, 1 << 50);
+    let scene = built(&builder, reference, 1, 1 << 50);
     let (shaders, _) = Shaders::compile(&scene, &Host::new()).unwrap_or_else(|faults| panic!("{faults}"));
     let mut reference = planes(&scene, &shaders, None).0;
     if let Some(truth) = scene.truth() {
@@ -80,7 +78,7 @@ fn measure(path: &Path, seeds: u64) {
     }
     let cost = |samples: u32, factor: u32, goal: Option<f64>| {
         let each = (0..seeds).map(|seed| {
-            let scene = built(&builder, samples, factor, 1000 + seed);
+            let scene = built(&builder, samples, factor, 1000 + u64::from(seed));
             let (planes, report) = planes(&scene, &shaders, goal);
             judged(&reference, &planes, &report)
         });
@@ -90,7 +88,7 @@ fn measure(path: &Path, seeds: u64) {
             lines: sum.lines + one.lines,
             rmse: sum.rmse + one.rmse,
         });
-        let count = seeds.max(1) as f64;
+        let count = f64::from(seeds.max(1));
         Cost { rays: sum.rays / count, seconds: sum.seconds / count, lines: sum.lines / count, rmse: sum.rmse / count }
     };
     let plain = PLAIN.map(|samples| cost(samples, 1, None));
