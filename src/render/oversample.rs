@@ -5,7 +5,7 @@
 //! # What the picture is
 //!
 //! A *pilot* of few samples per pixel looks for lines. It runs the line pass alone: no light and no colour is worked out that no
-//! line depends on. The picture is cut into blocks of [`BLOCK`] × [`BLOCK`] pixels, counted from its upper left corner whatever
+//! line depends on. The picture is cut into blocks of [`Oversampling::BLOCK`]² pixels, counted from its upper left corner whatever
 //! tiles, crop and threads are. A block is *lined* if a pixel within it, or within the reach of lines around it, shows a line in
 //! the pilot, at whatever path and of whatever surface. Lined blocks get `samples` × `line_oversampling` samples per pixel, all
 //! others `samples`; each is, bit for bit, that block of the picture that has its rate everywhere, as in [`refine`](super::refine),
@@ -51,9 +51,9 @@ pub struct Oversampled {
     pub pilot_seconds: f64,
     /// How much of the picture has which rate.
     pub rates: Vec<Rate>,
-    /// Blocks in which the pilot found lines, and all.
+    /// Blocks in which, or near which, the pilot found lines.
     pub lined_blocks: usize,
-    /// All blocks of the picture.
+    /// All blocks.
     pub blocks: usize,
 }
 
