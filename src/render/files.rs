@@ -139,7 +139,7 @@ pub(super) fn file_seconds(
     if mosaic.rect.pixels() == 0 {
         return Ok([0.0; 2]);
     }
-    let size = [mosaic.rect.width() as u32, mosaic.rect.height() as u32];
+    let size = [mosaic.rect.width(), mosaic.rect.height()];
     let small = RenderSettings { size, ..settings.clone() };
     let mut sum = [0.0; 2];
     for file in files {
