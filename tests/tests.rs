@@ -24,6 +24,7 @@ mod trace;
 // ... and the whole.
 mod flicker;
 mod live;
+mod oversampling;
 mod same_bits;
 mod sampling;
 mod session;

@@ -145,8 +145,8 @@ pub struct FlickerArguments {
         tusche study scene.toml -o study                    study/index.html shows the outcome\n  \
         tusche study scene.toml -o study --size 320x180 --budget 5m\n  \
         tusche study scene.toml -o study --knob samples --knob method --repeats 5\n\n\
-        Knobs: samples, method, sampler, ideal_samples, min_width, width_compensation, surfaces, reflection_depth,\n\
-        refraction_depth, filter. Of a scene with [truth] and without --knob, it is also measured\n\
+        Knobs: samples, method, sampler, line_oversampling, ideal_samples, min_width, width_compensation, surfaces,\n\
+        reflection_depth, refraction_depth, filter. Of a scene with [truth] and without --knob, it is also measured\n\
         how wide lines are drawn that are asked to have a width. A study that was stopped goes on where it was.",
     mut_arg("output", |argument| argument.help("The folder to write to; it is made if it is not there").value_name("DIR")),
     mut_arg("layer", |argument| argument.hide(true)),

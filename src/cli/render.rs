@@ -81,6 +81,7 @@ fn render_frame(
         crop: Some(crop),
         method: arguments.scene.lines.method(),
     };
+    check_sampling(arguments, &request)?;
     let time = arguments.time.map(|time| (time.as_secs_f64(), start));
     let result = render_request(&mut request, arguments.error, time, &options, cancel, &progress);
     progress.done();
@@ -88,6 +89,28 @@ fn render_frame(
     report.stats.seconds.load = request.load_seconds;
     report.stats.seconds.total = start.elapsed().as_secs_f64();
     conclude(arguments, &request, stats, report)
+}
+
+/// Whether what chooses the number of samples leaves room for what the scene says of it.
+fn check_sampling(arguments: &RenderArguments, request: &Request) -> Result<(), Failure> {
+    if request.plan.oversampling.is_none() {
+        return Ok(());
+    }
+    let off = "--set render.line_oversampling=1";
+    if arguments.time.is_some() {
+        let fault = Diagnostic::error(
+            "--time finds one number of samples for the whole picture, but the scene's `line_oversampling` asks for more at lines",
+        );
+        let hint = format!("add {off} to have the same number everywhere, or choose --samples instead of --time");
+        return Err(Diagnostics::from(fault.hint(hint)).into());
+    }
+    if arguments.error.is_some() && !arguments.scene.quiet {
+        let fault = Diagnostic::warning(
+            "`line_oversampling` does nothing here: --error finds how many samples each part of the picture needs",
+        );
+        terminal::say(&fault.hint(format!("{off} says the same without this warning")).into());
+    }
+    Ok(())
 }
 
 /// Renders with the scene's samples, to an error, or within a time from a start.
@@ -107,12 +130,14 @@ fn render_request(
     if let Some(time) = time {
         // Before time goes into finding out what fits.
         request.files.iter().try_for_each(|file| check_writable(&file.path))?;
-        let chosen = choose_samples(&request.scene, &request.shaders, &layers, time, options, &control)?;
+        let chosen = choose_samples(&request.scene, &request.shaders, &request.files, time, options, &control)?;
         let chosen = *choice.insert(chosen.ok_or_else(stopped_early)?);
         request.scene = request.scene.with_samples(chosen.samples);
         request.plan = Plan::new(&request.scene, &request.shaders, &layers);
     }
     if error.is_some() {
+        // It finds its own rates.
+        request.scene = request.scene.with_samples(request.scene.render().samples);
         request.plan = Plan::new(&request.scene, &request.shaders, &measured_layers(&layers));
     }
     let Request { scene, shaders, plan, files, .. } = request;
@@ -142,13 +167,24 @@ fn told(sampling: &Sampling) -> String {
             choice.samples, choice.asked_seconds, choice.pilot_seconds, choice.samples
         ),
         Sampling::Error(found) => {
-            let pixels: u64 = found.rates.iter().map(|rate| rate.pixels).sum();
-            let share = |rate: &Rate| 100.0 * rate.pixels as f64 / (pixels as f64).max(1.0);
-            let rates = found.rates.iter().map(|rate| format!("{} in {:.1} %", rate.samples, share(rate)));
-            let rates: Vec<_> = rates.collect();
-            format!("samples per pixel: {} of the picture, {:.1} in the mean", rates.join(", "), found.mean_samples)
+            format!("samples per pixel: {}, {:.1} in the mean", shares(&found.rates), found.mean_samples)
         }
+        Sampling::Lines(found) => format!(
+            "samples per pixel: {}; {} of {} blocks have lines, as a pilot of {} found",
+            shares(&found.rates),
+            found.lined_blocks,
+            found.blocks,
+            found.pilot_samples
+        ),
     }
+}
+
+/// How much of a picture has which rate.
+fn shares(rates: &[Rate]) -> String {
+    let pixels: u64 = rates.iter().map(|rate| rate.pixels).sum();
+    let share = |rate: &Rate| 100.0 * rate.pixels as f64 / (pixels as f64).max(1.0);
+    let rates: Vec<_> = rates.iter().map(|rate| format!("{} in {:.1} %", rate.samples, share(rate))).collect();
+    format!("{} of the picture", rates.join(", "))
 }
 
 /// What did not go as asked for.

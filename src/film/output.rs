@@ -9,6 +9,7 @@ use super::blocks::{Block, Blocks, Spool};
 use super::exr::ExrFormat;
 use super::layer::{FilmTile, Layer};
 use super::png::PngFormat;
+use crate::clock::CpuClock;
 use crate::diag::Diagnostic;
 use crate::sample::PixelRect;
 
@@ -113,6 +114,26 @@ impl Output {
             target.replace(|sink| format.write(&mut blocks, &mut *wrap(sink)))
         };
         finish().map_err(|error| target.failure(&error))
+    }
+
+    /// Makes an output of a whole picture in memory and forgets it. Returns the CPU seconds that this takes while tiles come, and
+    /// those at the end.
+    ///
+    /// # Errors
+    /// As [`Self::create`], but for what has to do with the disk.
+    pub(crate) fn rehearse(settings: OutputSettings, tile: &FilmTile) -> Result<[f64; 2], Diagnostic> {
+        let format = Format::new(&settings)?;
+        let failed = |error: io::Error| Diagnostic::error(format!("cannot pack this picture: {error}"));
+        let clock = CpuClock::thread();
+        let mut blocks = Blocks::new(settings.crop, format.value_bytes(), Box::new(io::Cursor::new(Vec::new())));
+        // The picture is whole and its pixels come once.
+        let full = blocks.put(tile.rect, &format.planes(tile)).unwrap_or_default();
+        for block in full {
+            blocks.store(block.index, &format.pack(block).map_err(failed)?).map_err(failed)?;
+        }
+        let coming = clock.seconds();
+        format.write(&mut blocks, &mut io::sink()).map_err(failed)?;
+        Ok([coming, clock.seconds() - coming])
     }
 
     fn store(&self, block: Block) -> Result<(), Diagnostic> {

@@ -41,6 +41,8 @@ impl Prepared {
     pub fn new(setup: &Arc<Setup>, samples: u32, older: Option<&Self>) -> Result<Self, Diagnostics> {
         let mut builder = setup.scene.clone().into_builder();
         builder.render.samples = samples;
+        // Live pictures have the same number everywhere: what was kept of them could not be used again else.
+        builder.render.line_oversampling = 1;
         let scene = builder.build()?;
         let mut plan = Plan::new(&scene, &setup.shaders, &setup.layers);
         // Kept whether or not the lines of this picture are tinted, so that to tint them takes the line pass alone.

@@ -1,6 +1,6 @@
 //! The plan in words, with reasons: what `tusche explain` prints.
 
-use super::{MaterialPlan, Plan, drawing_materials, refracts};
+use super::{MaterialPlan, Oversampling, Plan, drawing_materials, refracts};
 use crate::scene::Scene;
 use crate::scene::ids::MaterialId;
 use crate::scene::settings::{Background, FilterKind, LineSettings, LineType, RayKinds, RenderSettings, Sampler};
@@ -90,6 +90,9 @@ pub(super) fn explain(plan: &Plan, scene: &Scene, shaders: &Shaders) -> String {
     }
     if plan.lines.is_some() && !scene.stand_ins().is_empty() {
         row("groups", explain_groups(scene));
+    }
+    if scene.render().line_oversampling > 1 {
+        row("oversampling", explain_oversampling(plan));
     }
     row("strata", "1: no lens, no shutter, no rough mirror".into());
     row("surfaces", explain_surfaces(plan, scene.lines()));
@@ -199,6 +202,17 @@ fn explain_lines(plan: &Plan, scene: &Scene) -> String {
         // The bounds of scripts are rounded outwards; nobody needs to read that.
         (lines.widest * 1e3).round() / 1e3,
         lines.reach
+    )
+}
+
+fn explain_oversampling(plan: &Plan) -> String {
+    let Some(rates) = &plan.oversampling else { return "none: no line can be seen".into() };
+    let side = Oversampling::BLOCK;
+    let plural = if rates.pilot == 1 { "" } else { "s" };
+    format!(
+        "{} samples per pixel in blocks of {side} x {side} pixels in which lines are found, {} elsewhere; to find them costs {} \
+         sample{plural} per pixel of line attributes alone, and around the blocks both rates are traced",
+        rates.lines, rates.elsewhere, rates.pilot
     )
 }
 

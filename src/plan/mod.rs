@@ -77,6 +77,22 @@ pub struct LinePlan {
     pub tests: LineSettings,
 }
 
+/// More samples where lines are (`render.line_oversampling`): samples per pixel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Oversampling {
+    /// Of the pilot that looks for lines.
+    pub pilot: u32,
+    /// Where it finds some.
+    pub lines: u32,
+    /// Elsewhere.
+    pub elsewhere: u32,
+}
+
+impl Oversampling {
+    /// Side in pixels of the blocks of a picture that have one rate or the other.
+    pub const BLOCK: u32 = 16;
+}
+
 /// What this scene calls for.
 #[derive(Clone, Debug)]
 pub struct Plan {
@@ -94,6 +110,8 @@ pub struct Plan {
     pub shadow_rays: bool,
     /// The line pass; `None` if no line can be seen.
     pub lines: Option<LinePlan>,
+    /// Where pixels get more samples; `None` if all get the same number.
+    pub oversampling: Option<Oversampling>,
     /// How many surfaces a ray's list holds at most; 1 without lines.
     pub surfaces: u32,
     /// What samples keep.
@@ -124,6 +142,11 @@ impl Plan {
         let refraction_depth = if passes { settings.refraction_depth } else { 0 };
 
         let lines = plan_lines(scene, shaders, layers);
+        let oversampling = (lines.is_some() && settings.line_oversampling > 1).then(|| Oversampling {
+            pilot: (settings.samples / PILOT_SHARE).clamp(1, MOST_PILOT_SAMPLES),
+            lines: settings.samples.saturating_mul(settings.line_oversampling),
+            elsewhere: settings.samples,
+        });
         let surfaces = if lines.is_some() { tests.surfaces } else { 1 };
         let in_play = tests_in_play(scene, &drawing_materials(scene));
         let pairs = lines.as_ref().map_or(PairSet::empty(), |_| read_on_pairs(scene, shaders));
@@ -191,6 +214,7 @@ impl Plan {
             bodies,
             shadow_rays,
             lines,
+            oversampling,
             surfaces,
             layout,
             layers: layers.to_vec(),
@@ -232,6 +256,10 @@ impl fmt::Display for Plan {
         f.write_str(&self.explanation)
     }
 }
+
+/// The pilot that looks for lines has this part of the picture's samples, but at most so many: more find hardly more.
+const PILOT_SHARE: u32 = 4;
+const MOST_PILOT_SAMPLES: u32 = 4;
 
 /// How a surface's lines look.
 const LINE_OUTPUTS: OutputSet =

@@ -8,6 +8,7 @@
 mod files;
 mod grid;
 mod mask;
+pub mod oversample;
 pub mod refine;
 pub mod request;
 mod scripts;
@@ -42,7 +43,7 @@ use crate::scene::Scene;
 use crate::shade::{Lighting, ShadeErrors, Shaders};
 use crate::trace::wave::TracedTile;
 use crate::trace::{TileTracer, TraceContext, World};
-use stats::Stats;
+use stats::{Sampling, Stats};
 
 /// How to render; none of it changes the picture but `crop`, which leaves out parts.
 #[derive(Clone, Debug)]
@@ -90,7 +91,8 @@ pub struct Report {
 /// Takes finished tiles of the plan's layers: called from any thread, in any order, each pixel once.
 pub type Emit<'a> = &'a (dyn Fn(&FilmTile) -> Result<(), Diagnostic> + Sync);
 
-/// Renders a scene under its plan. Finished tiles of the plan's layers go to `emit`.
+/// Renders a scene under its plan, with more samples where lines are if that says so (see [`oversample`]). Finished tiles of the plan's
+/// layers go to `emit`.
 ///
 /// # Errors
 /// What `emit` returns, or that no threads could be started.
@@ -108,9 +110,16 @@ pub fn render(
         let mut totals = Totals::new(scene.materials().len());
         let mut errors = ShadeErrors::default();
         let pass = Pass { scene, shaders, plan, options, control, mask: None };
-        let complete = stage.render(&pass, &mut totals, &mut errors, emit)?;
+        let (complete, sampling) = match &plan.oversampling {
+            None => (stage.render(&pass, &mut totals, &mut errors, emit)?, None),
+            Some(rates) => {
+                let (complete, found) = oversample::render(&stage, &pass, rates, (&mut totals, &mut errors), emit)?;
+                (complete, Some(Sampling::Lines(found)))
+            }
+        };
         totals.seconds.build = stage.build_seconds;
         let mut report = totals.report(scene, shaders, plan, errors, complete);
+        report.stats.sampling = sampling;
         report.stats.seconds.total = start.elapsed().as_secs_f64();
         Ok(report)
     })

@@ -149,7 +149,7 @@ pub fn render_to_error(
         let picture = PixelRect::of_size(scene.render().size);
         let crop = options.crop.map_or(picture, |crop| crop.intersection(&picture));
         // Whole blocks are looked at, so that a crop comes out as in the whole picture.
-        let whole = whole_blocks(crop).intersection(&picture);
+        let whole = crop.to_blocks(BLOCK).intersection(&picture);
         let all = Mask::new(scene.render().size, whole, BLOCK, |_| true);
         let mut course = Course::new(goal, scene.render().sampler, &all, Canvas::new(whole, &plan.layers));
         let emit = |course: &Course<'_>, block: usize| {
@@ -197,13 +197,6 @@ pub fn render_to_error(
         report.stats.seconds.total = start.elapsed().as_secs_f64();
         Ok(report)
     })
-}
-
-/// The smallest rectangle of whole blocks that holds another.
-fn whole_blocks(rect: PixelRect) -> PixelRect {
-    let side = BLOCK as i32;
-    let (down, up) = (|x: i32| x.div_euclid(side) * side, |x: i32| (x + side - 1).div_euclid(side) * side);
-    PixelRect { x0: down(rect.x0), y0: down(rect.y0), x1: up(rect.x1), y1: up(rect.y1) }
 }
 
 /// How far the blocks of a picture are.

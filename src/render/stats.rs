@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::oversample::Oversampled;
 use super::refine::Refinement;
 use super::timed::Choice;
 use crate::line::LineCounts;
@@ -33,7 +34,7 @@ pub struct Stats {
     pub shaders: Vec<ShaderStats>,
     /// The plan, as `tusche explain` prints it.
     pub plan: String,
-    /// How the samples were chosen, where it was not the scene or `--samples` that did.
+    /// How the samples were chosen, where they are not as many everywhere as the scene or `--samples` says.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sampling: Option<Sampling>,
 }
@@ -46,6 +47,8 @@ pub enum Sampling {
     Time(Choice),
     /// By `--error`.
     Error(Refinement),
+    /// By `line_oversampling`: more where lines are.
+    Lines(Oversampled),
 }
 
 /// `total` is wall time; the others are CPU seconds summed over threads. Those of `load` and `build` count all that the
@@ -69,7 +72,7 @@ pub struct Seconds {
 }
 
 /// Rays by kind.
-#[derive(Clone, Copy, Debug, Default, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[allow(missing_docs, reason = "the names say it; see RayCounts")]
 pub struct Rays {
     pub camera: u64,

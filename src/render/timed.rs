@@ -6,18 +6,20 @@
 //! the picture is rendered from start to end with the number that was chosen. So it is complete and of one kind, and `--samples`
 //! with that number makes it again, bit for bit, on any machine.
 //!
-//! Time counts from the start of the command to the finished files. [`AIM`] of it is aimed at: what packing the files takes is
-//! only guessed at.
+//! Time counts from the start of the command to the finished files. What these take is learnt, too: the blocks of a pilot are packed
+//! together as the files will be. [`AIM`] of the time is aimed at.
 //!
 //! How to choose is kept apart from the clock ([`Chooser`]), so that it can be tested with clocks and costs that are made up.
 
+use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
 use serde::Serialize;
 
+use super::files::{PictureFile, file_seconds, layers_of};
 use super::{Control, Mask, Pass, RenderOptions, Stage, Totals, on_threads};
 use crate::diag::Diagnostic;
-use crate::film::Layer;
+use crate::film::{FilmTile, Layer};
 use crate::plan::Plan;
 use crate::sample::PixelRect;
 use crate::scene::Scene;
@@ -136,7 +138,7 @@ impl Chooser {
     }
 }
 
-/// Chooses how many samples per pixel fit into a time of `seconds` from `start`, for a picture of these layers. `None` if it was
+/// Chooses how many samples per pixel fit into a time of `seconds` from `start`, for a picture in these files. `None` if it was
 /// stopped.
 ///
 /// # Errors
@@ -144,7 +146,7 @@ impl Chooser {
 pub fn choose_samples(
     scene: &Scene,
     shaders: &Shaders,
-    layers: &[Layer],
+    files: &[PictureFile],
     (seconds, start): (f64, Instant),
     options: &RenderOptions,
     control: &Control<'_>,
@@ -152,7 +154,7 @@ pub fn choose_samples(
     on_threads(options.threads, || {
         let now = || start.elapsed().as_secs_f64();
         let begun = now();
-        let mut pilot = Pilot::new(scene, shaders, layers, options);
+        let mut pilot = Pilot::new(scene, shaders, files, options);
         let mut chooser = Chooser::new(seconds, now() - begun);
         loop {
             match chooser.next(now()) {
@@ -182,7 +184,8 @@ fn too_short(seconds: f64, needed: f64) -> Diagnostic {
 struct Pilot<'a> {
     scene: &'a Scene,
     shaders: &'a Shaders,
-    layers: &'a [Layer],
+    files: &'a [PictureFile],
+    layers: Vec<Layer>,
     options: RenderOptions,
     stage: Stage,
     mask: Mask,
@@ -190,13 +193,14 @@ struct Pilot<'a> {
 }
 
 impl<'a> Pilot<'a> {
-    fn new(scene: &'a Scene, shaders: &'a Shaders, layers: &'a [Layer], options: &RenderOptions) -> Self {
-        let stage = Stage::new(scene, &Plan::new(scene, shaders, layers));
+    fn new(scene: &'a Scene, shaders: &'a Shaders, files: &'a [PictureFile], options: &RenderOptions) -> Self {
+        let layers = layers_of(files);
+        let stage = Stage::new(scene, &Plan::new(scene, shaders, &layers));
         let size = scene.render().size;
         let picture = PixelRect::of_size(size);
         let crop = options.crop.map_or(picture, |crop| crop.intersection(&picture));
         let options = RenderOptions { tile: options.tile.min(BLOCK), crop: Some(crop), ..options.clone() };
-        Self { scene, shaders, layers, options, stage, mask: lattice(size, crop), crop }
+        Self { scene, shaders, files, layers, options, stage, mask: lattice(size, crop), crop }
     }
 
     fn measure(
@@ -208,27 +212,37 @@ impl<'a> Pilot<'a> {
     ) -> Result<Option<Measured>, Diagnostic> {
         let start = now();
         let scene = self.scene.with_samples(samples);
-        let plan = Plan::new(&scene, self.shaders, self.layers);
+        let plan = Plan::new(&scene, self.shaders, &self.layers);
         let progress = |_| control.progress.iter().for_each(|progress| progress((now() / seconds).min(1.0)));
         let control = Control { cancel: control.cancel, progress: Some(&progress) };
         let mut totals = Totals::new(scene.materials().len());
         let mut errors = ShadeErrors::default();
         let (shaders, options) = (self.shaders, &self.options);
         let pass = Pass { scene: &scene, shaders, plan: &plan, options, control: &control, mask: Some(&self.mask) };
-        if !self.stage.render(&pass, &mut totals, &mut errors, &|_| Ok(()))? {
+        let tiles = Mutex::new(Vec::new());
+        let keep = |tile: &FilmTile| {
+            tiles.lock().unwrap_or_else(PoisonError::into_inner).push(tile.clone());
+            Ok(())
+        };
+        if !self.stage.render(&pass, &mut totals, &mut errors, &keep)? {
             return Ok(None);
         }
+        let tiles = tiles.into_inner().unwrap_or_else(PoisonError::into_inner);
+        let [packing, closing] = file_seconds(self.scene.render(), &self.layers, self.files, &tiles)?;
         let reach = plan.lines.as_ref().map_or(0, |lines| lines.reach) + plan.filter.reach();
         let sampled = self.crop.grown(reach).intersection(&PixelRect::of_size(scene.render().size)).pixels();
         let shown: usize = self.mask.blocks().map(|block| self.mask.rect(block).pixels()).sum();
         let cost = &totals.seconds;
         let of_samples = (cost.trace + cost.shade + cost.lines) / (totals.samples as f64).max(1.0);
-        let of_pixels = cost.film / (shown as f64).max(1.0);
+        let of_pixels = cost.film / (shown as f64).max(1.0) + packing;
         let cpu = of_samples * sampled as f64 * f64::from(samples) + of_pixels * self.crop.pixels() as f64;
         // Where other programs want the CPUs, too, a second of work takes longer.
         let all = cost.trace + cost.shade + cost.lines + cost.film;
         let load = (totals.busy_seconds / all.max(1e-9)).max(1.0);
-        Ok(Some(Measured { samples, took: now() - start, whole: cpu * load / rayon::current_num_threads() as f64 }))
+        // One thread closes the files.
+        let alone = closing * self.crop.pixels() as f64;
+        let whole = (cpu / rayon::current_num_threads() as f64 + alone) * load;
+        Ok(Some(Measured { samples, took: now() - start, whole }))
     }
 }
 

@@ -9,6 +9,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::grid::Grid;
+use super::oversample::rate_at;
 use super::scripts::ScriptedLines;
 use crate::diag::{Diagnostic, Diagnostics};
 use crate::film::Layer;
@@ -171,6 +172,8 @@ pub fn why(scene: &Scene, shaders: &Shaders, place: [f32; 2]) -> Result<(Explana
     let pixel = pixel_of(scene, place)?;
     // A layer by type asks for the very pair; that of objects keeps apart what belongs to one group.
     let layers = [Layer::Rgba, Layer::LineType(LineType::Outline), Layer::Object];
+    let plan = Plan::new(scene, shaders, &layers);
+    let scene = &scene.with_samples(rate_at(scene, shaders, &plan, pixel)?);
     let plan = Plan::new(scene, shaders, &layers);
     let Some(lines) = &plan.lines else {
         let fault = Diagnostic::error("no line can be seen in this scene");

@@ -60,6 +60,14 @@ impl PixelRect {
         Self { x0: self.x0 - margin, y0: self.y0 - margin, x1: self.x1 + margin, y1: self.y1 + margin }
     }
 
+    /// The smallest rectangle that covers it and whose corners are multiples of `side`, which is above 0.
+    #[must_use]
+    pub fn to_blocks(&self, side: u32) -> Self {
+        let side = side as i32;
+        let (down, up) = (|x: i32| x.div_euclid(side) * side, |x: i32| (x + side - 1).div_euclid(side) * side);
+        Self { x0: down(self.x0), y0: down(self.y0), x1: up(self.x1), y1: up(self.y1) }
+    }
+
     /// The smallest rectangle that covers both.
     #[must_use]
     pub fn union(&self, other: &Self) -> Self {

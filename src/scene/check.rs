@@ -12,6 +12,8 @@ pub(super) const MAX_SIZE: u32 = 1 << 20;
 pub(super) const MAX_PIXELS: u64 = 1 << 32;
 /// The most samples a pixel can have.
 pub(super) const MAX_SAMPLES: u32 = 1 << 14;
+/// The most times as many samples that pixels get where lines are.
+pub(super) const MAX_LINE_OVERSAMPLING: u32 = 256;
 /// The widest line, in pixels.
 pub(super) const MAX_LINE_WIDTH: f32 = 1024.0;
 /// The longest surface list.
@@ -82,6 +84,14 @@ fn check_settings(scene: &SceneBuilder, faults: &mut Diagnostics) {
         format!("a picture can have at most {MAX_PIXELS} pixels"),
     );
     require((1..=MAX_SAMPLES).contains(&render.samples), format!("samples must be 1 to {MAX_SAMPLES}"));
+    require(
+        (1..=MAX_LINE_OVERSAMPLING).contains(&render.line_oversampling),
+        format!("line oversampling must be 1 to {MAX_LINE_OVERSAMPLING}"),
+    );
+    require(
+        render.samples.saturating_mul(render.line_oversampling) <= MAX_SAMPLES,
+        format!("samples times line oversampling must be at most {MAX_SAMPLES}"),
+    );
     require(
         render.filter_radius > 0.0 && render.filter_radius <= 64.0,
         "filter radius must be above 0 and at most 64 pixels".into(),

@@ -173,11 +173,20 @@ impl Scene {
         self.parts.meshes.iter().map(|mesh| mesh.triangles.len()).sum()
     }
 
-    /// The same scene with another number of samples per pixel, 1 … [`Self::MAX_SAMPLES`].
+    /// The same scene with another number of samples per pixel, 1 … [`Self::MAX_SAMPLES`], and with as many where lines are.
     #[must_use]
     pub fn with_samples(&self, samples: u32) -> Self {
         let mut scene = self.clone();
         scene.parts.render.samples = samples.clamp(1, Self::MAX_SAMPLES);
+        scene.parts.render.line_oversampling = 1;
+        scene
+    }
+
+    /// The same scene with samples at other places.
+    #[must_use]
+    pub fn with_seed(&self, seed: u64) -> Self {
+        let mut scene = self.clone();
+        scene.parts.render.seed = seed;
         scene
     }
 

@@ -56,6 +56,9 @@ pub struct RenderSettings {
     pub size: [u32; 2],
     /// Samples per pixel, at least 1.
     pub samples: u32,
+    /// How many times as many samples a pixel gets where lines are (see [`oversample`](crate::render::oversample)); 1 for as
+    /// many as elsewhere.
+    pub line_oversampling: u32,
     /// How they are spread over the pixel.
     pub sampler: Sampler,
     /// Chooses the sample positions.
@@ -79,6 +82,7 @@ impl Default for RenderSettings {
         Self {
             size: [1280, 720],
             samples: 16,
+            line_oversampling: 1,
             sampler: Sampler::Stratified,
             seed: 0,
             background: Background::Color(Vec3::splat(0.9)),

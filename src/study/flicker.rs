@@ -20,6 +20,7 @@ use crate::math::DVec2;
 use crate::plan::Plan;
 use crate::render::{Control, RenderOptions, render};
 use crate::scene::Scene;
+use crate::scene::settings::RenderSettings;
 use crate::shade::Shaders;
 
 /// What to measure.
@@ -151,13 +152,14 @@ impl Sums {
 /// Renders a frame in all four ways.
 fn render_frame(scene: Scene, shaders: &Shaders, number: u32, options: &FlickerOptions) -> Result<Frame, Diagnostics> {
     let shift = DVec2::from(options.step) * f64::from(number);
-    let (samples, seed) = (scene.render().samples, scene.render().seed);
+    let RenderSettings { samples, line_oversampling, seed, .. } = *scene.render();
     let mut builder = scene.into_builder();
     for camera in &mut builder.cameras {
         camera.film_shift += shift;
     }
-    let mut coverage = |samples: u32, seed: u64| {
+    let mut coverage = |samples: u32, line_oversampling: u32, seed: u64| {
         builder.render.samples = samples;
+        builder.render.line_oversampling = line_oversampling;
         builder.render.seed = seed;
         let scene = builder.clone().build()?;
         line_coverage(&scene, shaders, options.threads)
@@ -166,9 +168,9 @@ fn render_frame(scene: Scene, shaders: &Shaders, number: u32, options: &FlickerO
     // Seeds that nobody chooses, so that no pattern is used for two purposes.
     let unused = |purpose: u64| seed ^ (purpose << 40);
     Ok(Frame {
-        locked: coverage(samples, seed)?,
-        unlocked: coverage(samples, unused(u64::from(number) + 3))?,
-        references: [coverage(many, unused(1))?, coverage(many, unused(2))?],
+        locked: coverage(samples, line_oversampling, seed)?,
+        unlocked: coverage(samples, line_oversampling, unused(u64::from(number) + 3))?,
+        references: [coverage(many, 1, unused(1))?, coverage(many, 1, unused(2))?],
     })
 }
 

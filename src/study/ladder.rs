@@ -22,6 +22,8 @@ pub enum Knob {
     Method,
     /// How samples are spread over a pixel, at several rates.
     Sampler,
+    /// How many times as many samples there are at lines, at several rates.
+    LineOversampling,
     /// The minimum width of lines.
     MinWidth,
     /// Whether widths are corrected for thinning.
@@ -38,10 +40,11 @@ pub enum Knob {
 
 impl Knob {
     /// All of them, the most telling first.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 11] = [
         Self::Samples,
         Self::Method,
         Self::Sampler,
+        Self::LineOversampling,
         Self::IdealSamples,
         Self::MinWidth,
         Self::WidthCompensation,
@@ -59,6 +62,7 @@ impl Knob {
             Self::IdealSamples => "ideal_samples",
             Self::Method => "method",
             Self::Sampler => "sampler",
+            Self::LineOversampling => "line_oversampling",
             Self::MinWidth => "min_width",
             Self::WidthCompensation => "width_compensation",
             Self::Surfaces => "surfaces",
@@ -88,6 +92,8 @@ impl std::str::FromStr for Knob {
 pub struct Settings {
     /// Samples per pixel.
     pub samples: u32,
+    /// How many times as many there are at lines.
+    pub line_oversampling: u32,
     /// How they are spread over a pixel.
     pub sampler: Sampler,
     /// How lines are found.
@@ -115,6 +121,7 @@ impl Settings {
         let (render, lines) = (scene.render(), scene.lines());
         Self {
             samples: render.samples,
+            line_oversampling: render.line_oversampling,
             sampler: render.sampler,
             method: Method::Exact,
             min_width: lines.min_width,
@@ -131,6 +138,7 @@ impl Settings {
     pub fn apply(&self, scene: &mut SceneBuilder) {
         let (render, lines) = (&mut scene.render, &mut scene.lines);
         render.samples = self.samples;
+        render.line_oversampling = self.line_oversampling;
         render.sampler = self.sampler;
         render.reflection_depth = self.reflection_depth;
         render.refraction_depth = self.refraction_depth;
@@ -141,6 +149,12 @@ impl Settings {
         lines.surfaces = self.surfaces;
     }
 
+    /// The most samples that any pixel has.
+    #[must_use]
+    pub fn most_samples(&self) -> u32 {
+        self.samples.saturating_mul(self.line_oversampling)
+    }
+
     /// The value of a knob.
     #[must_use]
     pub fn value(&self, knob: Knob) -> String {
@@ -148,6 +162,7 @@ impl Settings {
             Knob::Samples | Knob::IdealSamples => self.samples.to_string(),
             Knob::Method => format!("{} {}", method_name(self.method), self.samples),
             Knob::Sampler => format!("{} {}", self.sampler.name(), self.samples),
+            Knob::LineOversampling => format!("{} x {}", self.samples, self.line_oversampling),
             Knob::MinWidth => self.min_width.to_string(),
             Knob::WidthCompensation => if self.width_compensation { "on" } else { "off" }.to_owned(),
             Knob::Surfaces => self.surfaces.to_string(),
@@ -202,6 +217,10 @@ const SAMPLES: [u32; 8] = [1, 2, 4, 9, 16, 36, 64, 144];
 const SAMPLER_SAMPLES: [u32; 3] = [4, 16, 64];
 /// Counts of line methods. The older ones take so much longer that the exact search has four times as many in the same time.
 const METHOD_SAMPLES: [u32; 3] = [1, 4, 16];
+/// How many times as many samples there are at lines.
+const LINE_OVERSAMPLING: [u32; 3] = [1, 4, 16];
+/// The most samples that this may come to.
+const MOST_OVERSAMPLED: u32 = 256;
 
 impl Ladder {
     /// The ladder of a scene, of the knobs that are asked for.
@@ -307,7 +326,7 @@ fn bisected(count: usize) -> Vec<usize> {
 
 /// The scene's settings without what is an approximation. The filter stays: another one is another picture.
 fn ideal(scene: &Scene, shaders: &Shaders, plan: &Plan, own: &Settings) -> Settings {
-    let mut ideal = *own;
+    let mut ideal = Settings { line_oversampling: 1, ..*own };
     if plan.lines.is_some() {
         if least_width(scene, shaders) < own.min_width {
             ideal.min_width = 0.0;
@@ -358,7 +377,12 @@ fn rungs(
             let all = counts(&SAMPLES, own.samples);
             all.into_iter().map(|samples| Settings { samples, ..*ideal }).collect()
         }
-        _ if !lines && matches!(knob, Knob::Method | Knob::MinWidth | Knob::WidthCompensation | Knob::Surfaces) => {
+        _ if !lines
+            && matches!(
+                knob,
+                Knob::Method | Knob::LineOversampling | Knob::MinWidth | Knob::WidthCompensation | Knob::Surfaces
+            ) =>
+        {
             return Err("no line can be seen");
         }
         Knob::Method => {
@@ -370,6 +394,14 @@ fn rungs(
             let all = counts(&SAMPLER_SAMPLES, own.samples);
             let at = |sampler| all.iter().map(move |samples| Settings { sampler, samples: *samples, ..*own });
             Sampler::ALL.into_iter().flat_map(at).collect()
+        }
+        Knob::LineOversampling => {
+            let all = counts(&SAMPLER_SAMPLES, own.samples);
+            let factors = counts(&LINE_OVERSAMPLING, own.line_oversampling);
+            let at =
+                |samples| factors.iter().map(move |factor| Settings { samples, line_oversampling: *factor, ..*own });
+            let affordable = |settings: &Settings| settings.most_samples() <= MOST_OVERSAMPLED || settings == own;
+            all.into_iter().flat_map(at).filter(affordable).collect()
         }
         Knob::MinWidth => {
             if least_width(scene, shaders) >= own.min_width.max(1.0) {
@@ -449,7 +481,10 @@ impl fmt::Display for Ladder {
                 let value = self.points[*point].value(*knob);
                 if *point == 0 { format!("[{value}]") } else { value }
             });
-            let separator = if matches!(knob, Knob::Filter | Knob::Method | Knob::Sampler) { ", " } else { " " };
+            let separator = match knob {
+                Knob::Filter | Knob::Method | Knob::Sampler | Knob::LineOversampling => ", ",
+                _ => " ",
+            };
             writeln!(f, "{:<20}{}", knob.name(), values.collect::<Vec<_>>().join(separator))?;
         }
         for (knob, why) in &self.left_out {

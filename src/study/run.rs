@@ -154,7 +154,7 @@ pub fn study(
         all.filter(is_missing).collect::<Vec<_>>()
     };
     let samples_of =
-        |waiting: &[(usize, u32)]| waiting.iter().map(|(point, _)| ladder.points[*point].samples).sum::<u32>();
+        |waiting: &[(usize, u32)]| waiting.iter().map(|(point, _)| ladder.points[*point].most_samples()).sum::<u32>();
 
     // The scene's own picture tells what all others will take.
     let mut first = None;
@@ -165,7 +165,7 @@ pub fn study(
     let per_sample = match runs.iter().find(|run| run.is_of(&ladder.points[0])) {
         Some(run) => run.wall_seconds,
         None => {
-            let advance = work.of("the scene", ladder.points[0].samples);
+            let advance = work.of("the scene", ladder.points[0].most_samples());
             let Some((shot, stats)) = camera.shoot(&ladder.points[0], 0, &advance)? else { return Err(stopped()) };
             first.insert((shot, stats)).1.seconds.total
         }
@@ -193,7 +193,7 @@ pub fn study(
     let (mut left_out, mut complete) = (0, true);
     for (point, repeat) in waiting {
         let settings = &ladder.points[point];
-        let expected = expected_seconds(&runs, settings.samples);
+        let expected = expected_seconds(&runs, settings.most_samples());
         let taken = if (point, repeat) == (0, 0) { first.take() } else { None };
         if taken.is_none()
             && deadline.is_some_and(|deadline| deadline.saturating_duration_since(Instant::now()) < seconds(expected))
@@ -202,7 +202,7 @@ pub fn study(
             continue;
         }
         let name = ladder.name(point);
-        let advance = work.of(&name, settings.samples);
+        let advance = work.of(&name, settings.most_samples());
         let shot = if taken.is_some() { taken } else { camera.shoot(settings, repeat, &advance)? };
         let Some((shot, stats)) = shot else {
             complete = false;
@@ -213,7 +213,7 @@ pub fn study(
             folder.keep_picture(&name, &shot)?;
         }
         table::write(&folder.table(), &runs)?;
-        work.done += f64::from(settings.samples);
+        work.done += f64::from(settings.most_samples());
     }
     let widths = if measures_widths && complete {
         let (widths, missing) = drawn_widths(&folder, options.threads, deadline, control)?;

@@ -22,6 +22,8 @@ pub struct Run {
     /// Samples per pixel of the reference.
     pub reference: u32,
     pub samples: u32,
+    #[serde(default = "one")]
+    pub line_oversampling: u32,
     /// How they are spread over a pixel.
     pub sampler: String,
     pub method: String,
@@ -59,6 +61,11 @@ pub struct Run {
     pub line_crossings: Option<f64>,
 }
 
+/// In tables of before there was more.
+fn one() -> u32 {
+    1
+}
+
 impl Run {
     /// A row.
     #[must_use]
@@ -68,6 +75,7 @@ impl Run {
             scene: identity.0.to_owned(),
             reference: identity.1,
             samples: settings.samples,
+            line_oversampling: settings.line_oversampling,
             sampler: settings.sampler.name().to_owned(),
             method: method_name(settings.method).to_owned(),
             min_width: settings.min_width,
@@ -105,6 +113,7 @@ impl Run {
     #[must_use]
     pub fn is_of(&self, settings: &Settings) -> bool {
         self.samples == settings.samples
+            && self.line_oversampling == settings.line_oversampling
             && self.sampler == settings.sampler.name()
             && self.method == method_name(settings.method)
             && self.min_width == settings.min_width

@@ -40,6 +40,7 @@ fn every_setting_is_taken_over() {
         RenderSettings {
             size: [320, 240],
             samples: 9,
+            line_oversampling: 4,
             sampler: Sampler::BlueNoise,
             seed: 7,
             background: Background::Gradient { bottom: Vec3::splat(0.1), top: Vec3::new(0.5, 0.6, 0.7) },

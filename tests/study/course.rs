@@ -69,7 +69,7 @@ fn a_study_writes_a_table_numbers_pictures_and_a_page() {
     assert_eq!(
         table.lines().next(),
         Some(
-            "scene,reference,samples,sampler,method,min_width,width_compensation,surfaces,reflection_depth,refraction_depth,filter,\
+            "scene,reference,samples,line_oversampling,sampler,method,min_width,width_compensation,surfaces,reflection_depth,refraction_depth,filter,\
              filter_radius,repeat,threads,wall_seconds,build_seconds,trace_seconds,shade_seconds,lines_seconds,film_seconds,\
              peak_rss_bytes,bytes_per_sample,rmse,rmse_lines,rmse_reflections,rmse_rest,flip,flip_lines,flip_reflections,flip_rest,\
              line_coverage,line_position,line_crossings"

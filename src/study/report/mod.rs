@@ -125,6 +125,7 @@ fn settings(settings: &Settings) -> Value {
     let short = |value: f32| value.to_string().parse::<f64>().unwrap_or_else(|_| value.into());
     json!({
         "samples": settings.samples,
+        "line_oversampling": settings.line_oversampling,
         "sampler": settings.sampler.name(),
         "method": method_name(settings.method),
         "min_width": short(settings.min_width),

@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 
 pub(super) use self::lines::{Compose, LinePath, Lines, MaterialLines, Threshold};
 pub(super) use self::truth::{Truth, TruthDisc, TruthEdge};
-use crate::scene::check::{MAX_SAMPLES, MAX_SIZE};
+use crate::scene::check::{MAX_LINE_OVERSAMPLING, MAX_SAMPLES, MAX_SIZE};
 use crate::scene::shape::MAX_SEGMENTS;
 
 /// Largest coordinate and length, in world units.
@@ -57,6 +57,10 @@ pub(super) struct Render {
     /// Samples per pixel.
     #[schemars(range(min = 1, max = MAX_SAMPLES))]
     pub samples: u32,
+    /// How many times as many samples a pixel gets in parts of the picture where a first look finds lines; 1 for as many as
+    /// elsewhere.
+    #[schemars(range(min = 1, max = MAX_LINE_OVERSAMPLING))]
+    pub line_oversampling: u32,
     /// How samples are spread over a pixel.
     pub sampler: Sampler,
     /// Chooses the sample positions; the same seed gives the same picture, bit for bit.
@@ -86,6 +90,7 @@ impl Default for Render {
         Self {
             size: [1280, 720],
             samples: 16,
+            line_oversampling: 1,
             sampler: Sampler::Stratified,
             seed: 0,
             background: Background::Color(Color([0.9; 3])),

@@ -7,7 +7,7 @@ use super::super::format;
 use super::{Resolver, rgb, unknown_name};
 use crate::diag::Diagnostic;
 use crate::math::Vec3;
-use crate::scene::check::MAX_PIXELS;
+use crate::scene::check::{MAX_PIXELS, MAX_SAMPLES};
 use crate::scene::ids::ObjectId;
 use crate::scene::settings::{
     Background, Composition, FilterKind, HiddenLines, LineOverrides, LineSettings, LineType, RayKinds, RenderSettings,
@@ -28,6 +28,13 @@ impl Resolver<'_> {
         if pixels > MAX_PIXELS {
             self.fault(format!("`size` makes {pixels} pixels: {MAX_PIXELS} are the most"), node.span_of("size"));
         }
+        let most = render.samples.saturating_mul(render.line_oversampling);
+        if most > MAX_SAMPLES {
+            let message =
+                format!("`samples` times `line_oversampling` are {most} samples per pixel: {MAX_SAMPLES} are the most");
+            let span = ["line_oversampling", "samples"].iter().find_map(|key| node.get(key)).unwrap_or(node);
+            self.fault(message, span.span.clone());
+        }
         if render.strata.is_some_and(|strata| strata != 1) {
             let warning = Diagnostic::warning("strata are not built yet: `strata` is ignored");
             self.faults.push(warning.at(node.key_span("strata")));
@@ -43,6 +50,7 @@ impl Resolver<'_> {
         self.scene.render = RenderSettings {
             size: render.size,
             samples: render.samples,
+            line_oversampling: render.line_oversampling,
             sampler: match render.sampler {
                 format::Sampler::Stratified => Sampler::Stratified,
                 format::Sampler::Sobol => Sampler::Sobol,
