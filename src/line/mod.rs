@@ -13,6 +13,7 @@
 mod baselines;
 mod bounds;
 mod brute;
+mod change;
 mod differ;
 mod inspect;
 mod lanes;
@@ -27,6 +28,7 @@ mod types;
 mod window;
 
 pub use bounds::TileBounds;
+pub use change::RuleChange;
 pub use differ::Fired;
 pub use inspect::{InspectedPair, TestResult, inspect, nearest_difference};
 pub use rules::Rules;
@@ -91,6 +93,54 @@ pub struct LineBuffer {
     pub counts: LineCounts,
     /// What scripts gave for lines that is no number, by `shader` value; may be shorter than there are materials.
     pub gate: Vec<GateCounts>,
+}
+
+impl SeenLine {
+    /// Whether pixels are the same with either: of the reasons only the strongest counts, and of the pair nothing.
+    fn looks_like(&self, other: &Self) -> bool {
+        let bits = |line: &Self| [line.color, line.lined].map(|color| color.map(f32::to_bits));
+        bits(self) == bits(other)
+            && self.alpha.to_bits() == other.alpha.to_bits()
+            && self.path == other.path
+            && self.hidden == other.hidden
+            && LineType::of(self.fired) == LineType::of(other.fired)
+    }
+}
+
+impl LineBuffer {
+    /// The least rectangle of pixels outside which the lines look like those of another buffer of the same samples, so many
+    /// in a pixel; `None` if all do.
+    #[must_use]
+    pub fn difference(&self, other: &Self, samples_per_pixel: u32) -> Option<PixelRect> {
+        let width = self.rect.width().max(1);
+        let mut changed: Option<PixelRect> = None;
+        let mut note = |sample: u32| {
+            let pixel = sample / samples_per_pixel.max(1);
+            let (x, y) = (self.rect.x0 + (pixel % width) as i32, self.rect.y0 + (pixel / width) as i32);
+            let pixel = PixelRect { x0: x, y0: y, x1: x + 1, y1: y + 1 };
+            changed = Some(changed.map_or(pixel, |changed| changed.union(&pixel)));
+        };
+        let (mut here, mut there) = (0, 0);
+        loop {
+            match (self.samples.get(here), other.samples.get(there)) {
+                (Some(a), Some(b)) if a == b => {
+                    if !self.lines[here].looks_like(&other.lines[there]) {
+                        note(*a);
+                    }
+                    (here, there) = (here + 1, there + 1);
+                }
+                (Some(a), b) if b.is_none_or(|b| a < b) => {
+                    note(*a);
+                    here += 1;
+                }
+                (_, Some(b)) => {
+                    note(*b);
+                    there += 1;
+                }
+                _ => return changed,
+            }
+        }
+    }
 }
 
 /// Work done by the line pass.

@@ -340,15 +340,15 @@ impl Shared {
         let mut samples = last;
         if let Some(stages) = &mut kept.stages {
             let prepared = Prepared::new(setup, stages.samples(), Some(stages.prepared()))?;
-            let redo = stages.redo_for(&prepared);
-            if !redo.trace && (stages.samples() == last || (self.options.progressive && stages.samples() < last)) {
-                let seconds = stages.seconds_for(&redo);
+            let change = stages.change_to(&prepared);
+            if !change.redo.trace && (stages.samples() == last || (self.options.progressive && stages.samples() < last)) {
+                let seconds = stages.seconds_for(&change.redo);
                 // A picture of one sample is traced from scratch; it must come much sooner to be worth that.
                 let needed = self.cache_for(Some(stages), stages.prepared()).needed;
                 let kept_of_it = if stages.keeps_records() { Kept::All } else { Kept::Samples };
                 let cache = CacheUse { kept: kept_of_it, needed, limit: self.options.cache_bytes };
                 let slow = seconds > PATIENCE && stages.seconds_at(1, size) < seconds / 3.0;
-                stages.set(prepared, &redo);
+                stages.set(prepared, &change);
                 if slow && self.options.progressive && stages.samples() > 1 {
                     let preview = Prepared::new(setup, 1, Some(stages.prepared()))?;
                     let mut preview = Stages::new(preview, self.options.tile, false);
