@@ -204,6 +204,9 @@ impl<'w> Search<'w, '_> {
         let bounded = nodes.bounds.of_pixel(place);
         self.targets.clear();
         self.near_pixel.clear();
+        if (pixel.first..pixel.end).all(|row| lined[nodes.nodes.rows.sample(row as usize) as usize]) {
+            return;
+        }
         let rect = pixel_rect(pixel.pixel);
         for near in &self.near_block {
             let gap_squared = rect_gap_squared(&rect, &near.block.rect);

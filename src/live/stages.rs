@@ -16,7 +16,7 @@ use super::session::Setup;
 use crate::clock::CpuClock;
 use crate::diag::Diagnostics;
 use crate::film::{FilmTile, FilmWindow, Layer, develop};
-use crate::line::{LineBuffer, LineTile, Method, RuleChange, TileBounds, Window, find_lines};
+use crate::line::{LineBuffer, LineTile, Method, RuleChange, TileBounds, Window, find_lines, find_lines_in};
 use crate::plan::Plan;
 use crate::render::{Control, Grid, Report, ScriptedLines, Totals, largest_tile};
 use crate::sample::{PixelRect, SampleBuffer};
@@ -100,8 +100,8 @@ impl Redone {
 #[derive(Default)]
 struct Tile {
     redo: Redo,
-    /// Its lines must be searched.
-    lines_due: bool,
+    /// The part of it whose lines must be searched.
+    lines_due: Option<PixelRect>,
     /// The part of it that must be developed.
     film_due: Option<PixelRect>,
     samples: Option<Box<SampleBuffer>>,
@@ -134,8 +134,8 @@ const CAMERA_RECORD_BYTES: u64 = 24;
 /// What a tile's samples cost to bring up to date.
 #[derive(Default)]
 struct Sampled {
-    /// Whether lines may look otherwise.
-    changed: bool,
+    /// The pixels outside which no sample asks for other lines.
+    changed: Option<PixelRect>,
     /// Whether the tile's own lines may, and no others.
     own_lines_changed: bool,
     /// Whether pixels may, even with the same lines.
@@ -286,9 +286,12 @@ impl Stages {
         for (index, (tile, concerned)) in self.tiles.iter_mut().zip(concerned).enumerate() {
             let of_tile = change.redo.of_tile(|id| sees(tile, id));
             tile.redo.add(&of_tile);
-            tile.lines_due |= concerned;
+            let whole = Some(self.grid.rect(index));
+            if concerned {
+                tile.lines_due = whole;
+            }
             if change.film {
-                tile.film_due = Some(self.grid.rect(index));
+                tile.film_due = whole;
             }
         }
         self.prepared = prepared;
@@ -313,7 +316,8 @@ impl Stages {
             }
         };
         let indices = (0..self.tiles.len()).into_par_iter().with_max_len(TILES_AT_ONCE);
-        indices.map(|index| self.tiles[index].lines_due || is_concerned(index)).collect()
+        let whole = |index: usize| self.tiles[index].lines_due == Some(self.grid.rect(index));
+        indices.map(|index| !whole(index) && is_concerned(index)).collect()
     }
 
     /// The tiles within so many pixels around a tile, with their numbers.
@@ -382,30 +386,31 @@ impl Stages {
             totals.seconds.lines += sampled.line_seconds;
             totals.hits.iter_mut().zip(&sampled.hits).for_each(|(total, hits)| *total += hits);
             totals.shade_seconds.iter_mut().zip(&sampled.shade_seconds).for_each(|(total, own)| *total += own);
-            self.tiles[*index].lines_due |= sampled.own_lines_changed;
-            if sampled.changed {
-                for near in self.grid.around(*index, self.reach[0]).tiles {
-                    self.tiles[near].lines_due = true;
-                }
+            let whole = self.grid.rect(*index);
+            if sampled.own_lines_changed {
+                self.tiles[*index].lines_due = Some(whole);
+            }
+            let (tiles, [lines, film]) = (&mut self.tiles, self.reach);
+            if let Some(changed) = sampled.changed {
+                around(tiles, &self.grid, (*index, changed), lines, |tile| &mut tile.lines_due);
             }
             if sampled.pixels_changed {
-                develop_around(&mut self.tiles, &self.grid, (*index, self.grid.rect(*index)), self.reach[1]);
+                around(tiles, &self.grid, (*index, whole), film, |tile| &mut tile.film_due);
             }
         }
 
         // Lines.
         let sampled = self.tiles.iter().all(|tile| tile.samples.is_some());
-        let due = |index: &usize| self.tiles[*index].lines_due;
         let found: Vec<(usize, Found)> = (0..self.tiles.len())
-            .filter(due)
+            .filter_map(|index| Some((index, self.tiles[index].lines_due?)))
             .collect::<Vec<_>>()
             .into_par_iter()
             .with_max_len(1)
-            .filter_map(|index| {
+            .filter_map(|(index, part)| {
                 if cancelled() || !sampled {
                     return None;
                 }
-                let found = self.lines_of(index, &contexts);
+                let found = self.lines_of(index, part, &contexts);
                 step();
                 Some((index, found))
             })
@@ -417,14 +422,14 @@ impl Stages {
             let tile = &mut self.tiles[index];
             tile.lines = found.lines;
             tile.line_errors = found.errors;
-            tile.lines_due = false;
+            tile.lines_due = None;
             if let Some(changed) = found.changed {
-                develop_around(&mut self.tiles, &self.grid, (index, changed), self.reach[1]);
+                around(&mut self.tiles, &self.grid, (index, changed), self.reach[1], |tile| &mut tile.film_due);
             }
         }
 
         // Film.
-        let lined = self.tiles.iter().all(|tile| tile.samples.is_some() && !tile.lines_due);
+        let lined = self.tiles.iter().all(|tile| tile.samples.is_some() && tile.lines_due.is_none());
         let developed: Vec<(usize, FilmTile, f64)> = (0..self.tiles.len())
             .filter_map(|index| Some((index, self.tiles[index].film_due?)))
             .collect::<Vec<_>>()
@@ -449,7 +454,7 @@ impl Stages {
             self.tiles[index].film_due = None;
         }
 
-        let is_due = |tile: &Tile| !tile.redo.is_nothing() || tile.lines_due || tile.film_due.is_some();
+        let is_due = |tile: &Tile| !tile.redo.is_nothing() || tile.lines_due.is_some() || tile.film_due.is_some();
         if self.tiles.iter().any(is_due) {
             return None;
         }
@@ -479,7 +484,8 @@ impl Stages {
         Outcome { report: totals.report(scene, &setup.shaders, plan, errors, true), redone, changed }
     }
 
-    fn lines_of(&self, index: usize, contexts: &Contexts<'_>) -> Found {
+    /// Searches the lines of a part of a tile; those of the rest stay.
+    fn lines_of(&self, index: usize, part: PixelRect, contexts: &Contexts<'_>) -> Found {
         let clock = CpuClock::thread();
         let (tile, whole) = (&self.tiles[index], self.grid.rect(index));
         let (Some(lines), Some(target)) = (&self.prepared.plan.lines, tile.for_lines()) else {
@@ -494,6 +500,9 @@ impl Stages {
                 errors = std::mem::take(&mut context.errors);
                 found
             })
+        } else if let Some(old) = tile.lines.as_ref().filter(|_| part != whole) {
+            let found = find_lines_in(part, &window, target, &lines.rules, Method::Exact);
+            found.with_others_outside(part, old, self.samples())
         } else {
             find_lines(&window, target, &lines.rules, Method::Exact, None)
         };
@@ -538,12 +547,18 @@ struct Found {
     seconds: f64,
 }
 
-/// Notes that all must be developed that some pixels of a tile reach.
-fn develop_around(tiles: &mut [Tile], grid: &Grid, (index, pixels): (usize, PixelRect), reach: i32) {
+/// Notes as due what some pixels of a tile reach.
+fn around(
+    tiles: &mut [Tile],
+    grid: &Grid,
+    (index, pixels): (usize, PixelRect),
+    reach: i32,
+    due: impl Fn(&mut Tile) -> &mut Option<PixelRect>,
+) {
     for near in grid.around(index, reach).tiles {
         let part = pixels.grown(reach).intersection(&grid.rect(near));
         if part.pixels() > 0 {
-            let due = &mut tiles[near].film_due;
+            let due = due(&mut tiles[near]);
             *due = Some(due.map_or(part, |due| due.union(&part)));
         }
     }
@@ -605,8 +620,9 @@ fn bring_up_to_date(
             let (new, old) = (&traced.samples, tile.samples.as_deref());
             let lit_lines = prepared.plan.lines.as_ref().is_some_and(|lines| lines.rules.read_light());
             sampled.pixels_changed = old != Some(new);
-            sampled.changed = sampled.pixels_changed
+            let changed = sampled.pixels_changed
                 && old.is_none_or(|old| (lit_lines && old.paths != new.paths) || !old.same_nodes(new));
+            sampled.changed = changed.then_some(rect);
             // Lines that let the sample's colour through have it mixed in.
             let covered = || tile.lines.as_ref().is_none_or(|lines| lines.lines.iter().all(|line| line.covers));
             sampled.own_lines_changed = old.is_none_or(|old| !old.same_colors(new)) && !covered();
@@ -622,7 +638,7 @@ fn bring_up_to_date(
     }
     let clock = CpuClock::thread();
     match (&prepared.plan.lines, &tile.samples) {
-        (Some(lines), Some(samples)) if sampled.changed || redo.bounds || tile.bounds.is_none() => {
+        (Some(lines), Some(samples)) if sampled.changed.is_some() || redo.bounds || tile.bounds.is_none() => {
             tile.bounds = Some(TileBounds::new(samples, &lines.rules));
         }
         (None, _) => tile.bounds = None,
@@ -650,7 +666,8 @@ fn restyle(
     let done = contexts.with(|context| {
         redo.restyle.iter().all(|material| match tracer.restyle(*material, shaders, samples, record, context) {
             Some(restyled) => {
-                sampled.changed |= restyled.changed;
+                let (one, other) = (sampled.changed, restyled.changed);
+                sampled.changed = one.zip(other).map(|(a, b)| a.union(&b)).or(one).or(other);
                 sampled.rays += restyled.rays;
                 sampled.hits[material.index()] += restyled.hits;
                 sampled.shade_seconds[material.index()] += restyled.seconds;
@@ -665,7 +682,7 @@ fn restyle(
     });
     sampled.seconds += clock.seconds();
     sampled.restyled = done;
-    sampled.pixels_changed = sampled.changed && prepared.plan.layers.contains(&Layer::Feature);
+    sampled.pixels_changed = sampled.changed.is_some() && prepared.plan.layers.contains(&Layer::Feature);
     if !done {
         // Half restyled: nobody knows how it was.
         tile.samples = None;
