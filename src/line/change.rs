@@ -55,7 +55,9 @@ impl RuleChange {
             return Self::everything();
         }
         let looks = match (old.settings(), new.settings()) {
-            (a, b) if a.compose != b.compose || a.types != b.types || old.hidden_color() != new.hidden_color() => Looks::All,
+            (a, b) if a.compose != b.compose || a.types != b.types || old.hidden_color() != new.hidden_color() => {
+                Looks::All
+            }
             (a, b) if a.tint == b.tint => Looks::None,
             // The camera's own nodes have no tint, but what is mixed with it may be rounded otherwise.
             (a, _) if a.compose == Composition::Replace => Looks::Secondary,

@@ -84,7 +84,6 @@ impl Redo {
         let seen_of = |ids: &BTreeSet<MaterialId>| ids.iter().copied().filter(|id| seen(*id)).collect();
         Self { shade_materials: seen_of(&self.shade_materials), restyle: seen_of(&self.restyle), ..self.clone() }
     }
-
 }
 
 impl Change {

@@ -341,7 +341,8 @@ impl Shared {
         if let Some(stages) = &mut kept.stages {
             let prepared = Prepared::new(setup, stages.samples(), Some(stages.prepared()))?;
             let change = stages.change_to(&prepared);
-            if !change.redo.trace && (stages.samples() == last || (self.options.progressive && stages.samples() < last)) {
+            if !change.redo.trace && (stages.samples() == last || (self.options.progressive && stages.samples() < last))
+            {
                 let seconds = stages.seconds_for(&change.redo);
                 // A picture of one sample is traced from scratch; it must come much sooner to be worth that.
                 let needed = self.cache_for(Some(stages), stages.prepared()).needed;

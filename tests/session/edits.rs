@@ -22,7 +22,10 @@ const KNOBS: &[Knob] = &[
     ("object test", &["", "", "object = false"]),
     ("shader test", &["", "", "shader = false"]),
     ("overlap test", &["", "", "overlap = 0.5", "overlap = 2.0"]),
-    ("surfaces", &["", "", "surfaces = 2", "surfaces = 3", "surfaces = 2\nhidden = { width = 1.0, color = [0.5, 0.5, 0.0] }"]),
+    (
+        "surfaces",
+        &["", "", "surfaces = 2", "surfaces = 3", "surfaces = 2\nhidden = { width = 1.0, color = [0.5, 0.5, 0.0] }"],
+    ),
     ("widest", &["", "max_width = 4.0"]),
     ("paths", &["", "", "", "paths = [\"camera\"]"]),
     (
