@@ -17,7 +17,7 @@ use super::differ::{self, Features, Tests, largest_difference};
 use super::overlap::Facet;
 use super::pair::distance_squared;
 use super::rules::Rules;
-use super::search::{pixel_gap_squared, pixel_rect, rect_gap_squared};
+use super::search::{pixel_gap_squared, pixel_rect, reached, rect_gap_squared};
 use super::window::{LineTile, PathTile, PathWindow, Window};
 use crate::sample::NodePath;
 use crate::scene::settings::Composition;
@@ -297,13 +297,17 @@ impl<'a> Turning<'_, '_, 'a> {
         let (own, bounded) = (&self.targets.bounds.pixels[place], self.targets.bounds.of_pixel(place));
         let rect = pixel_rect(own.pixel);
         near.iter().any(|(tile, block)| {
-            self.may_turn(&bounded, &block.bounded(), rect_gap_squared(&rect, &block.rect))
-                && (block.first as usize..block.end as usize).any(|other| {
-                    let neighbors = &tile.bounds.pixels[other];
-                    let gap_squared = pixel_gap_squared(own.pixel, neighbors.pixel);
-                    self.may_turn(&bounded, &tile.bounds.of_pixel(other), gap_squared)
-                        && self.any_of_rows(own, tile, neighbors)
-                })
+            if !self.may_turn(&bounded, &block.bounded(), rect_gap_squared(&rect, &block.rect)) {
+                return false;
+            }
+            let part = block.part(&reached(own.pixel, bounded.bounds.radius_squared.max(block.bounds.radius_squared)));
+            let all = if part.is_some() { 0..0 } else { block.first..block.end };
+            part.into_iter().flatten().chain(all).any(|other| {
+                let neighbors = &tile.bounds.pixels[other as usize];
+                let gap_squared = pixel_gap_squared(own.pixel, neighbors.pixel);
+                self.may_turn(&bounded, &tile.bounds.of_pixel(other as usize), gap_squared)
+                    && self.any_of_rows(own, tile, neighbors)
+            })
         })
     }
 

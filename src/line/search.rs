@@ -628,7 +628,7 @@ fn far_squared(targets: [i32; 2], neighbors: [i32; 2]) -> f32 {
 
 /// The pixels whose [`pixel_gap_squared`] from a pixel may be no more than this.
 #[inline]
-fn reached(pixel: [i32; 2], gap_squared: f32) -> PixelRect {
+pub(super) fn reached(pixel: [i32; 2], gap_squared: f32) -> PixelRect {
     // More than any picture is wide, and no overflow.
     const FAR: f32 = 1e8;
     pixel_rect(pixel).grown(1 + gap_squared.sqrt().min(FAR) as i32)

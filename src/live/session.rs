@@ -6,6 +6,8 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 
+use rayon::prelude::*;
+
 use super::stages::{Outcome, Prepared, Redone, Stages};
 use crate::diag::{Diagnostic, Diagnostics, Source};
 use crate::film::{FilmTile, Layer};
@@ -430,7 +432,8 @@ impl Shared {
             is_final: samples == last,
             size: scene.render().size,
             layers: stages.prepared().plan.layers.clone(),
-            channels: stages.channels().to_vec(),
+            // New memory takes longer to come than to be written.
+            channels: stages.channels().par_iter().cloned().collect(),
             changed: if shows_all { whole } else { changed },
             redone,
             cache,

@@ -2,7 +2,7 @@
 //!
 //! All tiles are sampled, then their lines are found, then they are developed, on all threads. A tile that an edit does
 //! not reach is not touched: samples stay if no ray or shader changed for them, lines if no sample within reach did,
-//! pixels if no line or sample under their filter did. What is left to do is noted in the tiles, so that work can be
+//! pixels if no line or sample under their filter did; and of a tile that it reaches, only the part. What is left to do is noted in the tiles, so that work can be
 //! dropped at any moment and taken up for a later setup.
 
 use std::sync::atomic::{AtomicUsize, Ordering};

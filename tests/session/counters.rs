@@ -129,17 +129,17 @@ fn tint_runs_the_line_pass_and_the_film_alone() {
 #[test]
 fn a_threshold_concerns_the_tiles_where_pairs_lie_between() {
     let mut desk = Desk::new();
-    desk.replace("normal = 40.0", "normal = 85.0");
-    // The edges of the box, at 90 degrees, cease to be creases.
-    let fewer = desk.replace("normal = 85.0", "normal = 95.0");
+    desk.replace("normal = 40.0", "normal = 15.0");
+    // The ball bends less than that within a line's reach, whether seen itself or in the mirror.
+    let fewer = desk.replace("normal = 15.0", "normal = 100.0");
     assert_eq!((rays(&fewer), fewer.redone.shaded, fewer.redone.restyled), (0, 0, 0), "{:?}", fewer.redone);
     assert!(fewer.redone.lined > 0 && fewer.redone.lined < fewer.redone.tiles / 2, "{:?}", fewer.redone);
     assert!(fewer.changed.pixels() > 0);
     desk.is_fresh(&fewer);
-    // Nothing bends more than they do.
-    let same = desk.replace("normal = 95.0", "normal = 120.0");
+    // Nothing bends more.
+    let same = desk.replace("normal = 100.0", "normal = 120.0");
     assert_eq!((rays(&same), same.redone.lined, same.redone.developed), (0, 0, 0), "{:?}", same.redone);
-    let more = desk.replace("normal = 120.0", "normal = 85.0");
+    let more = desk.replace("normal = 120.0", "normal = 15.0");
     assert!(more.redone.lined == fewer.redone.lined && more.changed == fewer.changed, "{:?}", more.redone);
     desk.is_fresh(&more);
 }
