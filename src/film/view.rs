@@ -15,6 +15,8 @@
 
 use std::ops::Range;
 
+use rayon::prelude::*;
+
 use super::layer::Layer;
 use crate::math::srgb_from_linear;
 use crate::sample::PixelRect;
@@ -69,15 +71,17 @@ impl View {
     #[must_use]
     pub fn pixels<const N: usize>(&self, channels: &[Vec<f32>], width: usize, rect: PixelRect) -> Vec<u8> {
         let channels = &channels[self.channels.clone()];
-        let mut bytes = Vec::with_capacity(rect.pixels() * N);
-        for y in rect.y0..rect.y1 {
-            let row = y as usize * width;
-            for i in row + rect.x0 as usize..row + rect.x1 as usize {
+        let mut bytes = vec![0; rect.pixels() * N];
+        let row_bytes = (rect.width() as usize * N).max(1);
+        // On all threads: somebody waits for it.
+        bytes.par_chunks_mut(row_bytes).with_min_len(ROWS_AT_ONCE).zip(rect.y0..rect.y1).for_each(|(bytes, y)| {
+            let start = y as usize * width + rect.x0 as usize;
+            for (bytes, i) in bytes.chunks_exact_mut(N).zip(start..) {
                 let mut value = [0.0; 4];
                 value.iter_mut().zip(channels).for_each(|(value, channel)| *value = channel[i]);
-                bytes.extend_from_slice(&self.show(value)[..N]);
+                bytes.copy_from_slice(&self.show(value)[..N]);
             }
-        }
+        });
         bytes
     }
 
@@ -98,6 +102,9 @@ impl View {
         [r, g, b, u8::MAX]
     }
 }
+
+/// Rows of pixels that a thread takes at least.
+const ROWS_AT_ONCE: usize = 16;
 
 /// A value 0 … 1 to the nearest byte; what is outside is clamped.
 pub(super) fn byte(value: f32) -> u8 {

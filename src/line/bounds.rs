@@ -134,6 +134,24 @@ impl Shape {
         }
     }
 
+    /// The least and the greatest squared distance of texture coordinates that hits here and there may have.
+    pub(super) fn uv_squared_range(&self, other: &Self) -> [f32; 2] {
+        [self.uv.smallest_distance_squared(&other.uv), self.uv.largest_distance_squared(&other.uv)]
+    }
+
+    /// The same of normals.
+    pub(super) fn chord_squared_range(&self, other: &Self) -> [f32; 2] {
+        [self.normal.smallest_distance_squared(&other.normal), self.normal.largest_distance_squared(&other.normal)]
+    }
+
+    /// The same of the largest difference of a channel.
+    pub(super) fn feature_range(&self, other: &Self) -> [f32; 2] {
+        let largest = |of: fn(&Extent<3>, &Extent<3>, usize) -> f32| {
+            (0..3).map(|i| of(&self.feature, &other.feature, i)).fold(0.0, f32::max)
+        };
+        [largest(Extent::smallest_difference), largest(Extent::largest_difference)]
+    }
+
     /// Whether hits here and there may differ.
     #[inline]
     fn may_differ(&self, other: &Self, tests: &Tests) -> bool {
@@ -195,7 +213,7 @@ impl Bounds {
     }
 
     /// Whether some object may be both here and there.
-    fn may_share_object(&self, other: &Self) -> bool {
+    pub(super) fn may_share_object(&self, other: &Self) -> bool {
         self.object[0] <= other.object[1] && other.object[0] <= self.object[1] && self.object[1] > 0
     }
 
@@ -296,6 +314,19 @@ impl Block {
     #[inline]
     pub(super) fn bounded(&self) -> Bounded<'_> {
         Bounded { bounds: &self.bounds, shape: &self.shape, facets: &self.facets }
+    }
+
+    /// The places of its pixels in a rectangle, if all its pixels have nodes and not all of them lie there; else `None`.
+    #[inline]
+    pub(super) fn part(&self, rect: &PixelRect) -> Option<impl Iterator<Item = u32> + use<>> {
+        let part = rect.intersection(&self.rect);
+        let is_full = (self.end - self.first) as usize == self.rect.pixels();
+        let (x, y, width) = (part.x0 - self.rect.x0, part.y0 - self.rect.y0, self.rect.width());
+        (is_full && part.pixels() < self.rect.pixels()).then(|| {
+            let first = self.first + y as u32 * width + x as u32;
+            let (columns, rows) = (part.width(), part.height());
+            (0..rows).flat_map(move |row| (0..columns).map(move |column| first + row * width + column))
+        })
     }
 }
 

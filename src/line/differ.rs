@@ -132,9 +132,16 @@ impl Tests {
         }
         fired.set(Fired::UV, distance_squared(a.uv, b.uv) > self.uv_squared);
         fired.set(Fired::NORMAL, distance_squared(a.normal, b.normal) > self.chord_squared);
-        fired.set(Fired::FEATURE, (0..3).any(|i| (a.feature[i] - b.feature[i]).abs() > self.feature));
+        fired.set(Fired::FEATURE, largest_difference(a.feature, b.feature) > self.feature);
         fired
     }
+}
+
+/// The largest difference of a channel between two feature colours.
+#[inline]
+pub(super) fn largest_difference(a: [f32; 3], b: [f32; 3]) -> f32 {
+    let difference = |i: usize| (a[i] - b[i]).abs();
+    difference(0).max(difference(1)).max(difference(2))
 }
 
 /// The squared chord of an angle in degrees; ∞ from 180 on, so that rounding makes no opposite normals differ.
@@ -146,8 +153,9 @@ fn chord_squared(degrees: f32) -> f32 {
     (4.0 * half_chord * half_chord) as f32
 }
 
+/// The squared distance between two uv or two normals.
 #[inline]
-fn distance_squared<const N: usize>(a: [f32; N], b: [f32; N]) -> f32 {
+pub(super) fn distance_squared<const N: usize>(a: [f32; N], b: [f32; N]) -> f32 {
     let mut sum = 0.0;
     for i in 0..N {
         let difference = a[i] - b[i];

@@ -39,6 +39,11 @@ impl MaterialTests {
         self.by_shader.get(shader as usize).unwrap_or(&self.by_shader[0])
     }
 
+    /// How many `shader` values there are tests for.
+    pub(super) fn shaders(&self) -> u32 {
+        self.by_shader.len() as u32
+    }
+
     pub(super) fn overrides_of(&self, shader: u32) -> LineOverrides {
         let index = (shader as usize).checked_sub(1);
         index.and_then(|index| self.overrides.get(index)).copied().unwrap_or_default()

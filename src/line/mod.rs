@@ -13,6 +13,7 @@
 mod baselines;
 mod bounds;
 mod brute;
+mod change;
 mod differ;
 mod inspect;
 mod lanes;
@@ -27,6 +28,7 @@ mod types;
 mod window;
 
 pub use bounds::TileBounds;
+pub use change::RuleChange;
 pub use differ::Fired;
 pub use inspect::{InspectedPair, TestResult, inspect, nearest_difference};
 pub use rules::Rules;
@@ -93,6 +95,78 @@ pub struct LineBuffer {
     pub gate: Vec<GateCounts>,
 }
 
+impl SeenLine {
+    /// Whether pixels are the same with either: of the reasons only the strongest counts, and of the pair nothing.
+    fn looks_like(&self, other: &Self) -> bool {
+        let bits = |line: &Self| [line.color, line.lined].map(|color| color.map(f32::to_bits));
+        bits(self) == bits(other)
+            && self.alpha.to_bits() == other.alpha.to_bits()
+            && self.path == other.path
+            && self.hidden == other.hidden
+            && LineType::of(self.fired) == LineType::of(other.fired)
+    }
+}
+
+impl LineBuffer {
+    fn new(rect: PixelRect, mut lines: Vec<(u32, SeenLine)>, counts: LineCounts, gate: Vec<GateCounts>) -> Self {
+        lines.sort_unstable_by_key(|&(sample, _)| sample);
+        let lined_samples = lines.len() as u64;
+        let hidden_samples = lines.iter().filter(|(_, line)| line.hidden).count() as u64;
+        let (samples, lines) = lines.into_iter().unzip();
+        Self { rect, samples, lines, counts: LineCounts { lined_samples, hidden_samples, ..counts }, gate }
+    }
+
+    /// These lines of a part of a rectangle, and those of another buffer outside it; both of the same samples, so many in
+    /// a pixel.
+    #[must_use]
+    pub(crate) fn with_others_outside(self, part: PixelRect, other: &Self, samples_per_pixel: u32) -> Self {
+        let outside = |sample: &u32| {
+            let [x, y] = self.pixel_of(*sample, samples_per_pixel);
+            !part.contains(x, y)
+        };
+        let kept = other.samples.iter().copied().zip(other.lines.iter().copied()).filter(|(sample, _)| outside(sample));
+        let lines = self.samples.iter().copied().zip(self.lines.iter().copied()).chain(kept).collect();
+        Self::new(self.rect, lines, self.counts, self.gate)
+    }
+
+    fn pixel_of(&self, sample: u32, samples_per_pixel: u32) -> [i32; 2] {
+        let (pixel, width) = (sample / samples_per_pixel.max(1), self.rect.width().max(1));
+        [self.rect.x0 + (pixel % width) as i32, self.rect.y0 + (pixel / width) as i32]
+    }
+
+    /// The least rectangle of pixels outside which the lines look like those of another buffer of the same samples, so many
+    /// in a pixel; `None` if all do.
+    #[must_use]
+    pub fn difference(&self, other: &Self, samples_per_pixel: u32) -> Option<PixelRect> {
+        let mut changed: Option<PixelRect> = None;
+        let mut note = |sample: u32| {
+            let [x0, y0] = self.pixel_of(sample, samples_per_pixel);
+            let pixel = PixelRect { x0, y0, x1: x0 + 1, y1: y0 + 1 };
+            changed = Some(changed.map_or(pixel, |changed| changed.union(&pixel)));
+        };
+        let (mut here, mut there) = (0, 0);
+        loop {
+            match (self.samples.get(here), other.samples.get(there)) {
+                (Some(a), Some(b)) if a == b => {
+                    if !self.lines[here].looks_like(&other.lines[there]) {
+                        note(*a);
+                    }
+                    (here, there) = (here + 1, there + 1);
+                }
+                (Some(a), b) if b.is_none_or(|b| a < b) => {
+                    note(*a);
+                    here += 1;
+                }
+                (_, Some(b)) => {
+                    note(*b);
+                    there += 1;
+                }
+                _ => return changed,
+            }
+        }
+    }
+}
+
 /// Work done by the line pass.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LineCounts {
@@ -129,9 +203,37 @@ pub fn find_lines(
     target: LineTile<'_>,
     rules: &Rules,
     method: Method,
+    scripts: Option<&mut (dyn LineScripts + '_)>,
+) -> LineBuffer {
+    find(window, target, vec![false; target.buffer.samples()], rules, method, scripts)
+}
+
+/// The same for the pixels of a part of the target alone: other samples see no line.
+#[must_use]
+pub(crate) fn find_lines_in(
+    part: PixelRect,
+    window: &Window<'_>,
+    target: LineTile<'_>,
+    rules: &Rules,
+    method: Method,
+) -> LineBuffer {
+    let outside = |sample| {
+        let [x, y] = target.buffer.pixel_of(sample);
+        !part.contains(x, y)
+    };
+    let skipped = (0..target.buffer.samples() as u32).map(outside).collect();
+    find(window, target, skipped, rules, method, None)
+}
+
+/// Those that are `lined` see no further line.
+fn find(
+    window: &Window<'_>,
+    target: LineTile<'_>,
+    mut lined: Vec<bool>,
+    rules: &Rules,
+    method: Method,
     mut scripts: Option<&mut (dyn LineScripts + '_)>,
 ) -> LineBuffer {
-    let mut lined = vec![false; target.buffer.samples()];
     let mut lines: Vec<(u32, SeenLine)> = Vec::new();
     let mut counts = LineCounts::default();
     let mut gate = Vec::new();
@@ -169,11 +271,7 @@ pub fn find_lines(
             lines.push((sample, line));
         });
     }
-    lines.sort_unstable_by_key(|&(sample, _)| sample);
-    counts.lined_samples = lines.len() as u64;
-    counts.hidden_samples = lines.iter().filter(|(_, line)| line.hidden).count() as u64;
-    let (samples, lines) = lines.into_iter().unzip();
-    LineBuffer { rect: target.buffer.rect, samples, lines, counts, gate }
+    LineBuffer::new(target.buffer.rect, lines, counts, gate)
 }
 
 /// The samples that look for no hidden line at a path: those that have a line, and those whose rays go on through the

@@ -4,10 +4,10 @@ use super::differ::Tests;
 use super::materials::MaterialTests;
 use super::style::LineScript;
 use super::types::TypeRules;
-use crate::math::portable;
+use crate::math::{Vec3, portable};
 use crate::sample::NodePath;
 use crate::sample::position::gap_factor;
-use crate::scene::settings::{Composition, LineOverrides, LineSettings, RayKinds, Sampler};
+use crate::scene::settings::{Composition, LineOverrides, LineSettings, RayKinds, Sampler, TypeStyle};
 
 /// [`LineSettings`] with all that follows from them and the sample rate worked out once.
 #[derive(Clone, Debug, PartialEq)]
@@ -94,12 +94,27 @@ impl Rules {
         self
     }
 
-    /// Whether the same samples have the same lines under other rules. What the rules know of the widest line only bounds
-    /// the search.
-    #[must_use]
-    pub fn same_lines(&self, other: &Self) -> bool {
+    /// Whether the same samples have the same lines under other rules, but for what their tests find and what they look
+    /// like. What the rules know of the widest line only bounds the search, and samples have a width and a colour of their
+    /// own.
+    pub(super) fn same_but_for_tests_and_looks(&self, other: &Self) -> bool {
         let narrower = self.widest.min(other.widest);
-        self.clone().with_widest(narrower) == other.clone().with_widest(narrower)
+        let bare = |rules: &Self| {
+            let mut bare = rules.clone();
+            let LineSettings { color, width, tint, compose, .. } = LineSettings::default();
+            let untested = LineOverrides::NO_TESTS.over(&bare.settings);
+            bare.settings = LineSettings { color, width, tint, compose, ..untested };
+            bare.settings.types = bare.settings.types.map(|style| TypeStyle { color: None, opacity: None, ..style });
+            if let Some(hidden) = &mut bare.settings.hidden {
+                hidden.color = Vec3::ZERO;
+            }
+            if let Some(hidden) = &mut bare.hidden {
+                hidden.color = [0.0; 3];
+            }
+            bare.with_materials(&[]).with_widest(narrower)
+        };
+        // With types, it matters which of several pairs is found that look alike.
+        self.exact_pairs() == other.exact_pairs() && bare(self) == bare(other)
     }
 
     /// Whether bounds of a tile that were made by other rules serve these, too: how far apart attributes must be, and
@@ -147,6 +162,16 @@ impl Rules {
     #[inline]
     pub(super) fn script_of(&self, shader: u32) -> LineScript {
         self.scripts.get(shader as usize).copied().unwrap_or_default()
+    }
+
+    /// How many `shader` values there are whose tests may be others than those of the first.
+    pub(super) fn shaders_tested(&self) -> u32 {
+        self.materials.as_ref().map_or(1, MaterialTests::shaders)
+    }
+
+    /// The colour of hidden lines.
+    pub(super) fn hidden_color(&self) -> Option<[f32; 3]> {
+        self.hidden.as_ref().map(|hidden| hidden.color)
     }
 
     /// Whether no script styles any line.

@@ -204,6 +204,9 @@ impl<'w> Search<'w, '_> {
         let bounded = nodes.bounds.of_pixel(place);
         self.targets.clear();
         self.near_pixel.clear();
+        if (pixel.first..pixel.end).all(|row| lined[nodes.nodes.rows.sample(row as usize) as usize]) {
+            return;
+        }
         let rect = pixel_rect(pixel.pixel);
         for near in &self.near_block {
             let gap_squared = rect_gap_squared(&rect, &near.block.rect);
@@ -211,7 +214,7 @@ impl<'w> Search<'w, '_> {
                 self.near_pixel.push(Near { gap_squared, ..*near });
             }
         }
-        if self.near_pixel.is_empty() {
+        if self.near_pixel.is_empty() || !self.may_be_seen(pixel.pixel, &bounded) {
             return;
         }
         for row in pixel.first as usize..pixel.end as usize {
@@ -228,6 +231,21 @@ impl<'w> Search<'w, '_> {
         }
         self.search_others(pixel.pixel, &bounded);
         self.search_own(pixel.pixel, &bounded);
+    }
+
+    /// Whether a pixel near a pixel of targets may matter to them. Asked only where few pixels are near enough; else it is
+    /// cheaper to search.
+    fn may_be_seen(&self, pixel: [i32; 2], targets: &Bounded<'_>) -> bool {
+        self.near_pixel.iter().any(|near| {
+            let widest = targets.bounds.radius_squared.max(near.block.bounds.radius_squared);
+            near.block.part(&reached(pixel, widest)).is_none_or(|mut places| {
+                places.any(|place| {
+                    let neighbors = near.bounds.of_pixel(place as usize);
+                    let gap_squared = pixel_gap_squared(pixel, near.bounds.pixels[place as usize].pixel);
+                    may_matter(self.rules, targets, &neighbors, gap_squared)
+                })
+            })
+        })
     }
 
     /// Finds for each target the highest-ranking valid pair whose neighbour outranks it.
@@ -347,10 +365,16 @@ impl<'w> Search<'w, '_> {
             if gap_squared >= block.bounds.radius_squared {
                 continue;
             }
-            for &index in &bounds.by_rank[block.first as usize..block.end as usize] {
-                let place = block.first + u32::from(index);
+            let part = block.part(&reached(pixel, block.bounds.radius_squared));
+            let is_part = part.is_some();
+            let by_rank = &bounds.by_rank[if is_part { 0..0 } else { block.first as usize..block.end as usize }];
+            let by_rank = by_rank.iter().map(|index| block.first + u32::from(*index));
+            for place in part.into_iter().flatten().chain(by_rank) {
                 let neighbors = &bounds.pixels[place as usize];
                 if floor.outranks(neighbors.bounds.best) {
+                    if is_part {
+                        continue;
+                    }
                     break;
                 }
                 let gap_squared = pixel_gap_squared(pixel, neighbors.pixel);
@@ -450,7 +474,9 @@ impl<'w> Search<'w, '_> {
             if block.bounds.lowest.outranks(own.highest) {
                 continue;
             }
-            for place in block.first..block.end {
+            let part = block.part(&reached(pixel, own.limit));
+            let all = if part.is_some() { 0..0 } else { block.first..block.end };
+            for place in part.into_iter().flatten().chain(all) {
                 let neighbors = &bounds.pixels[place as usize];
                 let gap_squared = pixel_gap_squared(pixel, neighbors.pixel);
                 if gap_squared > own.limit || neighbors.bounds.lowest.outranks(own.highest) {
@@ -598,6 +624,14 @@ fn far_squared(targets: [i32; 2], neighbors: [i32; 2]) -> f32 {
     let far = |axis: usize| ((neighbors[axis] - targets[axis]).abs() + 1) as f32;
     let (x, y) = (far(0), far(1));
     x * x + y * y
+}
+
+/// The pixels whose [`pixel_gap_squared`] from a pixel may be no more than this.
+#[inline]
+pub(super) fn reached(pixel: [i32; 2], gap_squared: f32) -> PixelRect {
+    // More than any picture is wide, and no overflow.
+    const FAR: f32 = 1e8;
+    pixel_rect(pixel).grown(1 + gap_squared.sqrt().min(FAR) as i32)
 }
 
 pub(super) fn pixel_rect([x, y]: [i32; 2]) -> PixelRect {

@@ -6,6 +6,7 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
+use crate::line::RuleChange;
 use crate::plan::{LINE_SLICE, MaterialPlan, Plan};
 use crate::sample::SampleLayout;
 use crate::scene::Scene;
@@ -28,11 +29,18 @@ pub(super) struct Redo {
     pub shade_materials: BTreeSet<MaterialId>,
     /// Hits of these materials get other line attributes.
     pub restyle: BTreeSet<MaterialId>,
-    /// The lines of all tiles are looked for.
-    pub lines: bool,
-    /// So that their search needs other bounds.
+    /// What the line pass needs other bounds for.
     pub bounds: bool,
-    /// All tiles are developed.
+}
+
+/// What leads from one setup to another.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Change {
+    /// What must be done again to samples.
+    pub redo: Redo,
+    /// Which lines must be looked for again though samples stay.
+    pub lines: RuleChange,
+    /// Whether all tiles are developed.
     pub film: bool,
 }
 
@@ -47,7 +55,7 @@ pub(super) struct View<'a> {
 impl Redo {
     /// Everything.
     pub fn all() -> Self {
-        Self { trace: true, visibility: true, shade: true, lines: true, bounds: true, film: true, ..Self::default() }
+        Self { trace: true, visibility: true, shade: true, bounds: true, ..Self::default() }
     }
 
     /// Whether there is nothing to do.
@@ -68,9 +76,7 @@ impl Redo {
         self.shade |= other.shade;
         self.shade_materials.extend(&other.shade_materials);
         self.restyle.extend(&other.restyle);
-        self.lines |= other.lines;
         self.bounds |= other.bounds;
-        self.film |= other.film;
     }
 
     /// What a tile needs of it that sees only some materials.
@@ -78,10 +84,12 @@ impl Redo {
         let seen_of = |ids: &BTreeSet<MaterialId>| ids.iter().copied().filter(|id| seen(*id)).collect();
         Self { shade_materials: seen_of(&self.shade_materials), restyle: seen_of(&self.restyle), ..self.clone() }
     }
+}
 
-    /// What leads from one setup to another.
+impl Change {
+    /// From one setup to another.
     pub fn between(old: View<'_>, new: View<'_>) -> Self {
-        let mut redo = Self::default();
+        let mut redo = Redo::default();
         let same_rays = same_world(old, new)
             && old.scene.camera() == new.scene.camera()
             && same_sampling(old.scene, new.scene)
@@ -89,7 +97,7 @@ impl Redo {
             && old.plan.bodies == new.plan.bodies
             && (new.plan.surfaces == 1 || same_lists(old, new));
         if !same_rays {
-            return Self::all();
+            return Self { redo: Redo::all(), lines: RuleChange::everything(), film: true };
         }
         if !same_ties(old.scene, new.scene) {
             redo.ties = true;
@@ -104,17 +112,24 @@ impl Redo {
         }
         redo.shade |= old.scene.time() != new.scene.time();
         redo.shade |= !same_shading(old, new);
-        redo.lines |= lines_differ(old.plan, new.plan);
         redo.bounds |= match (&old.plan.lines, &new.plan.lines) {
             (Some(a), Some(b)) => !a.rules.same_bounds(&b.rules),
             (a, b) => a.is_some() != b.is_some(),
         };
-        redo.film |= old.plan.filter != new.plan.filter || old.plan.layers != new.plan.layers;
+        let mut lines = match (&old.plan.lines, &new.plan.lines) {
+            (Some(a), Some(b)) => RuleChange::between(&a.rules, &b.rules),
+            (None, None) => RuleChange::default(),
+            _ => RuleChange::everything(),
+        };
         for (index, (a, b)) in old.shaders.iter().zip(new.shaders.iter()).enumerate() {
             let id = MaterialId::from_index(index);
             compare_material(&mut redo, id, (a, old), (b, new));
+            if !a.same_as(b) && (a.styles_lines() || b.styles_lines()) {
+                lines = lines.with_looks();
+            }
         }
-        redo
+        let film = old.plan.filter != new.plan.filter || old.plan.layers != new.plan.layers;
+        Self { redo, lines, film }
     }
 }
 
@@ -204,15 +219,6 @@ fn same_shading(old: View<'_>, new: View<'_>) -> bool {
         && old.shaders.aovs() == new.shaders.aovs()
 }
 
-/// Whether the line pass may find other lines in the same samples.
-fn lines_differ(old: &Plan, new: &Plan) -> bool {
-    match (&old.lines, &new.lines) {
-        (Some(a), Some(b)) => a.scripted != b.scripted || !a.rules.same_lines(&b.rules),
-        (None, None) => false,
-        _ => true,
-    }
-}
-
 /// Whether what scripts leave open about lines, and the widest line, are the same for a material.
 fn same_style(old: View<'_>, new: View<'_>, id: MaterialId, shader: &Shader) -> bool {
     let draws = |settings: &LineSettings| (settings.width, settings.color);
@@ -236,9 +242,6 @@ fn compare_material(redo: &mut Redo, id: MaterialId, (a, old): (&Shader, View<'_
     let same = a.same_as(b);
     if same && before == after && same_style(old, new, id, b) {
         return;
-    }
-    if !same && (a.styles_lines() || b.styles_lines()) {
-        redo.lines = true;
     }
     if before.blocks_light() != after.blocks_light()
         || (!same && !after.blocks_light() && !a.same_outputs(b, OPACITY_SLICE))

@@ -33,7 +33,7 @@ use crate::scene::file;
 use crate::scene::settings::{Background, RenderSettings};
 
 /// How long files may still be coming after one is known to be complete.
-const QUIET: Duration = Duration::from_millis(8);
+const QUIET: Duration = Duration::from_millis(3);
 /// How long after the first sign of a change nothing more is waited for.
 const BATCH: Duration = Duration::from_millis(25);
 /// How long a new setup waits for the first picture of the one before.
@@ -88,6 +88,8 @@ pub(super) struct Driver {
     progress: Option<Instant>,
     /// What was kept of the last picture.
     kept: Kept,
+    /// What was loaded, until pages are told of it: that waits for the picture, since telling takes time on the same cores.
+    untold: Option<SceneRequest>,
 }
 
 /// Events that belong together.
@@ -158,6 +160,7 @@ impl Driver {
             told: Default::default(),
             progress: None,
             kept: Kept::All,
+            untold: None,
         }
     }
 
@@ -280,6 +283,8 @@ impl Driver {
     fn load(&mut self, tell: &mut dyn FnMut(News)) {
         let due = self.due.take().unwrap_or_default();
         self.held_back = None;
+        // It tells of files as they were read then.
+        self.post_scene();
         let noticed = due.since.unwrap_or_else(Instant::now);
         let store = self.store.succeeded(&due.changed);
         let mut request = self.options.scene.clone();
@@ -299,7 +304,7 @@ impl Driver {
         // Files may have changed since they were read, and nobody listened to new ones until now.
         self.look(&BTreeSet::new(), noticed);
         match loaded {
-            Ok((loaded, files)) => self.show(&request, loaded, files, noticed, tell),
+            Ok((loaded, files)) => self.show(request, loaded, files, noticed, tell),
             Err(faults) if (self.due.is_some() || self.look_again.is_some()) && self.retries < MOST_RETRIES => {
                 self.retries += 1;
                 self.held_back = Some(faults);
@@ -327,7 +332,7 @@ impl Driver {
 
     fn show(
         &mut self,
-        request: &SceneRequest,
+        request: SceneRequest,
         loaded: LoadedScene,
         files: Vec<PictureFile>,
         noticed: Instant,
@@ -360,7 +365,7 @@ impl Driver {
                 tell(News::Warnings(self.warnings.clone()));
             }
         }
-        self.post_scene(request);
+        self.untold = Some(request);
         self.post_faults();
     }
 
@@ -378,6 +383,9 @@ impl Driver {
             Event::Begun { .. } => {}
             Event::Progress { samples, share, .. } => {
                 let is_slow = self.current.as_ref().is_none_or(|current| current.began.elapsed() >= PROGRESS_FROM);
+                if is_slow {
+                    self.post_scene();
+                }
                 if is_slow && self.progress.is_none_or(|last| last.elapsed() >= PROGRESS) {
                     self.progress = Some(Instant::now());
                     self.board.post(Topic::Progress, messages::progress(samples, share));
@@ -390,6 +398,7 @@ impl Driver {
                     current.settled = true;
                     self.dropped = 0;
                 }
+                self.post_scene();
                 self.fail(faults, tell);
             }
         }
@@ -433,6 +442,9 @@ impl Driver {
             if picture.script_errors.has_errors() {
                 tell(News::ScriptErrors(picture.script_errors.clone()));
             }
+        }
+        if is_newest {
+            self.post_scene();
         }
         tell(News::Picture { picture, after });
     }
@@ -500,8 +512,9 @@ impl Driver {
         Ok(())
     }
 
-    /// Tells pages all about the scene.
-    fn post_scene(&self, request: &SceneRequest) {
+    /// Tells pages all about the scene that was loaded, unless they know.
+    fn post_scene(&mut self) {
+        let Some(request) = self.untold.take() else { return };
         let Some(setup) = self.session.setup() else { return };
         let written = file::written(&request.path, &self.store, &request.overrides).unwrap_or_default();
         let groups = controls(&written, &setup.scene, &setup.shaders, &self.edits);

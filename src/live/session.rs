@@ -6,6 +6,8 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 
+use rayon::prelude::*;
+
 use super::stages::{Outcome, Prepared, Redone, Stages};
 use crate::diag::{Diagnostic, Diagnostics, Source};
 use crate::film::{FilmTile, Layer};
@@ -340,15 +342,16 @@ impl Shared {
         let mut samples = last;
         if let Some(stages) = &mut kept.stages {
             let prepared = Prepared::new(setup, stages.samples(), Some(stages.prepared()))?;
-            let redo = stages.redo_for(&prepared);
-            if !redo.trace && (stages.samples() == last || (self.options.progressive && stages.samples() < last)) {
-                let seconds = stages.seconds_for(&redo);
+            let change = stages.change_to(&prepared);
+            if !change.redo.trace && (stages.samples() == last || (self.options.progressive && stages.samples() < last))
+            {
+                let seconds = stages.seconds_for(&change.redo);
                 // A picture of one sample is traced from scratch; it must come much sooner to be worth that.
                 let needed = self.cache_for(Some(stages), stages.prepared()).needed;
                 let kept_of_it = if stages.keeps_records() { Kept::All } else { Kept::Samples };
                 let cache = CacheUse { kept: kept_of_it, needed, limit: self.options.cache_bytes };
                 let slow = seconds > PATIENCE && stages.seconds_at(1, size) < seconds / 3.0;
-                stages.set(prepared, &redo);
+                stages.set(prepared, &change);
                 if slow && self.options.progressive && stages.samples() > 1 {
                     let preview = Prepared::new(setup, 1, Some(stages.prepared()))?;
                     let mut preview = Stages::new(preview, self.options.tile, false);
@@ -429,7 +432,8 @@ impl Shared {
             is_final: samples == last,
             size: scene.render().size,
             layers: stages.prepared().plan.layers.clone(),
-            channels: stages.channels().to_vec(),
+            // New memory takes longer to come than to be written.
+            channels: stages.channels().par_iter().cloned().collect(),
             changed: if shows_all { whole } else { changed },
             redone,
             cache,

@@ -2,7 +2,7 @@
 //!
 //! All tiles are sampled, then their lines are found, then they are developed, on all threads. A tile that an edit does
 //! not reach is not touched: samples stay if no ray or shader changed for them, lines if no sample within reach did,
-//! pixels if no line or sample under their filter did. What is left to do is noted in the tiles, so that work can be
+//! pixels if no line or sample under their filter did; and of a tile that it reaches, only the part. What is left to do is noted in the tiles, so that work can be
 //! dropped at any moment and taken up for a later setup.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -11,12 +11,12 @@ use std::time::Instant;
 
 use rayon::prelude::*;
 
-use super::change::{Redo, View};
+use super::change::{Change, Redo, View};
 use super::session::Setup;
 use crate::clock::CpuClock;
 use crate::diag::Diagnostics;
 use crate::film::{FilmTile, FilmWindow, Layer, develop};
-use crate::line::{LineBuffer, LineTile, Method, TileBounds, Window, find_lines};
+use crate::line::{LineBuffer, LineTile, Method, RuleChange, TileBounds, Window, find_lines, find_lines_in};
 use crate::plan::Plan;
 use crate::render::{Control, Grid, Report, ScriptedLines, Totals, largest_tile};
 use crate::sample::{PixelRect, SampleBuffer};
@@ -47,6 +47,11 @@ impl Prepared {
         let mut plan = Plan::new(&scene, &setup.shaders, &setup.layers);
         // Kept whether or not the lines of this picture are tinted, so that to tint them takes the line pass alone.
         plan.layout.columns.throughput |= plan.lines.is_some() && plan.has_secondary_rays();
+        if let Some(older) = older {
+            // So that a test that is turned off and on again costs no shading.
+            plan.layout.columns.uv |= older.plan.layout.columns.uv;
+            plan.layout.columns.normal |= older.plan.layout.columns.normal;
+        }
         let clock = CpuClock::process();
         let view = View { scene: &scene, shaders: &setup.shaders, plan: &plan };
         let world = match older {
@@ -97,9 +102,10 @@ impl Redone {
 #[derive(Default)]
 struct Tile {
     redo: Redo,
-    /// Its lines must be searched, its pixels developed.
-    lines_due: bool,
-    film_due: bool,
+    /// The part of it whose lines must be searched.
+    lines_due: Option<PixelRect>,
+    /// The part of it that must be developed.
+    film_due: Option<PixelRect>,
     samples: Option<Box<SampleBuffer>>,
     bounds: Option<TileBounds>,
     record: Option<TileRecord>,
@@ -130,8 +136,8 @@ const CAMERA_RECORD_BYTES: u64 = 24;
 /// What a tile's samples cost to bring up to date.
 #[derive(Default)]
 struct Sampled {
-    /// Whether lines may look otherwise.
-    changed: bool,
+    /// The pixels outside which no sample asks for other lines.
+    changed: Option<PixelRect>,
     /// Whether the tile's own lines may, and no others.
     own_lines_changed: bool,
     /// Whether pixels may, even with the same lines.
@@ -248,9 +254,9 @@ impl Stages {
         [if self.keeps_records { with } else { without + CAMERA_RECORD_BYTES }, without]
     }
 
-    /// What a setup asks for that is not done yet.
-    pub fn redo_for(&self, prepared: &Prepared) -> Redo {
-        Redo::between(self.prepared.view(), prepared.view())
+    /// What leads to another setup.
+    pub fn change_to(&self, prepared: &Prepared) -> Change {
+        Change::between(self.prepared.view(), prepared.view())
     }
 
     /// About how many seconds it takes to bring the samples up to date with `redo`, and with what was left over from
@@ -277,16 +283,50 @@ impl Stages {
     }
 
     /// Notes what leads to a setup of the same size and number of samples; the setup is the one to come.
-    pub fn set(&mut self, prepared: Prepared, redo: &Redo) {
-        for tile in &mut self.tiles {
-            let of_tile = redo.of_tile(|id| sees(tile, id));
-            tile.lines_due |= redo.lines;
-            tile.film_due |= redo.film;
+    pub fn set(&mut self, prepared: Prepared, change: &Change) {
+        let concerned = self.concerned(&change.lines);
+        for (index, (tile, concerned)) in self.tiles.iter_mut().zip(concerned).enumerate() {
+            let of_tile = change.redo.of_tile(|id| sees(tile, id));
             tile.redo.add(&of_tile);
+            let whole = Some(self.grid.rect(index));
+            if concerned {
+                tile.lines_due = whole;
+            }
+            if change.film {
+                tile.film_due = whole;
+            }
         }
         self.prepared = prepared;
         self.make_room();
         self.widen_reach();
+    }
+
+    /// Which tiles need other lines even if all samples stay as they are.
+    fn concerned(&self, change: &RuleChange) -> Vec<bool> {
+        let Some(lines) = self.prepared.plan.lines.as_ref().filter(|_| !change.is_nothing()) else {
+            return vec![!change.is_nothing(); self.tiles.len()];
+        };
+        let is_concerned = |index: usize| {
+            // What has changed since the lines were found is searched anyway, and cannot be asked.
+            let is_known = |tile: &Tile| tile.samples.is_some() && !tile.redo.bounds;
+            let tile = &self.tiles[index];
+            let (window, near) = self.window_of(index, lines.reach);
+            let known = near.iter().all(|near| is_known(&self.tiles[*near]));
+            match (tile.for_lines(), &tile.lines) {
+                (Some(target), Some(found)) if known => change.concerns(&window, target, found, &lines.rules),
+                _ => true,
+            }
+        };
+        let indices = (0..self.tiles.len()).into_par_iter().with_max_len(TILES_AT_ONCE);
+        let whole = |index: usize| self.tiles[index].lines_due == Some(self.grid.rect(index));
+        indices.map(|index| !whole(index) && is_concerned(index)).collect()
+    }
+
+    /// The tiles within so many pixels around a tile, with their numbers.
+    fn window_of(&self, index: usize, reach: i32) -> (Window<'_>, Vec<usize>) {
+        let part = self.grid.around(index, reach);
+        let tiles = part.tiles.iter().map(|tile| self.tiles[*tile].for_lines()).collect();
+        (Window { origin: part.origin, tile: self.grid.tile, columns: part.columns, tiles }, part.tiles)
     }
 
     fn make_room(&mut self) {
@@ -348,29 +388,31 @@ impl Stages {
             totals.seconds.lines += sampled.line_seconds;
             totals.hits.iter_mut().zip(&sampled.hits).for_each(|(total, hits)| *total += hits);
             totals.shade_seconds.iter_mut().zip(&sampled.shade_seconds).for_each(|(total, own)| *total += own);
-            self.tiles[*index].lines_due |= sampled.own_lines_changed;
-            if sampled.changed {
-                for near in self.grid.around(*index, self.reach[0]).tiles {
-                    self.tiles[near].lines_due = true;
-                }
+            let whole = self.grid.rect(*index);
+            if sampled.own_lines_changed {
+                self.tiles[*index].lines_due = Some(whole);
+            }
+            let (tiles, [lines, film]) = (&mut self.tiles, self.reach);
+            if let Some(changed) = sampled.changed {
+                around(tiles, &self.grid, (*index, changed), lines, |tile| &mut tile.lines_due);
             }
             if sampled.pixels_changed {
-                for near in self.grid.around(*index, self.reach[1]).tiles {
-                    self.tiles[near].film_due = true;
-                }
+                around(tiles, &self.grid, (*index, whole), film, |tile| &mut tile.film_due);
             }
         }
 
         // Lines.
+        let sampled = self.tiles.iter().all(|tile| tile.samples.is_some());
         let found: Vec<(usize, Found)> = (0..self.tiles.len())
+            .filter_map(|index| Some((index, self.tiles[index].lines_due?)))
+            .collect::<Vec<_>>()
             .into_par_iter()
             .with_max_len(1)
-            .filter(|index| self.tiles[*index].lines_due)
-            .filter_map(|index| {
-                if cancelled() || self.tiles.iter().any(|tile| tile.samples.is_none()) {
+            .filter_map(|(index, part)| {
+                if cancelled() || !sampled {
                     return None;
                 }
-                let found = self.lines_of(index, &contexts);
+                let found = self.lines_of(index, part, &contexts);
                 step();
                 Some((index, found))
             })
@@ -380,32 +422,27 @@ impl Stages {
             redone.lined += 1;
             totals.seconds.lines += found.seconds;
             let tile = &mut self.tiles[index];
-            let same = match (&tile.lines, &found.lines) {
-                (Some(old), Some(new)) => old.samples == new.samples && old.lines == new.lines,
-                (None, None) => true,
-                _ => false,
-            };
             tile.lines = found.lines;
             tile.line_errors = found.errors;
-            tile.lines_due = false;
-            if !same {
-                for near in self.grid.around(index, self.reach[1]).tiles {
-                    self.tiles[near].film_due = true;
-                }
+            tile.lines_due = None;
+            if let Some(changed) = found.changed {
+                around(&mut self.tiles, &self.grid, (index, changed), self.reach[1], |tile| &mut tile.film_due);
             }
         }
 
         // Film.
+        let lined = self.tiles.iter().all(|tile| tile.samples.is_some() && tile.lines_due.is_none());
         let developed: Vec<(usize, FilmTile, f64)> = (0..self.tiles.len())
+            .filter_map(|index| Some((index, self.tiles[index].film_due?)))
+            .collect::<Vec<_>>()
             .into_par_iter()
             .with_max_len(1)
-            .filter(|index| self.tiles[*index].film_due)
-            .filter_map(|index| {
-                if cancelled() || self.tiles.iter().any(|tile| tile.samples.is_none() || tile.lines_due) {
+            .filter_map(|(index, part)| {
+                if cancelled() || !lined {
                     return None;
                 }
                 let clock = CpuClock::thread();
-                let film = self.develop(index);
+                let film = self.develop(index, part);
                 step();
                 Some((index, film, clock.seconds()))
             })
@@ -416,10 +453,10 @@ impl Stages {
             if self.put(&film) {
                 self.changed = Some(self.changed.map_or(film.rect, |changed| changed.union(&film.rect)));
             }
-            self.tiles[index].film_due = false;
+            self.tiles[index].film_due = None;
         }
 
-        let is_due = |tile: &Tile| !tile.redo.is_nothing() || tile.lines_due || tile.film_due;
+        let is_due = |tile: &Tile| !tile.redo.is_nothing() || tile.lines_due.is_some() || tile.film_due.is_some();
         if self.tiles.iter().any(is_due) {
             return None;
         }
@@ -449,13 +486,14 @@ impl Stages {
         Outcome { report: totals.report(scene, &setup.shaders, plan, errors, true), redone, changed }
     }
 
-    fn lines_of(&self, index: usize, contexts: &Contexts<'_>) -> Found {
+    /// Searches the lines of a part of a tile; those of the rest stay.
+    fn lines_of(&self, index: usize, part: PixelRect, contexts: &Contexts<'_>) -> Found {
         let clock = CpuClock::thread();
-        let Some(lines) = &self.prepared.plan.lines else { return Found::default() };
-        let part = self.grid.around(index, lines.reach);
-        let tiles = part.tiles.iter().map(|tile| self.tiles[*tile].for_lines()).collect();
-        let window = Window { origin: part.origin, tile: self.grid.tile, columns: part.columns, tiles };
-        let Some(target) = self.tiles[index].for_lines() else { return Found::default() };
+        let (tile, whole) = (&self.tiles[index], self.grid.rect(index));
+        let (Some(lines), Some(target)) = (&self.prepared.plan.lines, tile.for_lines()) else {
+            return Found { changed: tile.lines.as_ref().map(|_| whole), ..Found::default() };
+        };
+        let (window, _) = self.window_of(index, lines.reach);
         let mut errors = ShadeErrors::default();
         let found = if lines.scripted {
             contexts.with(|context| {
@@ -464,13 +502,21 @@ impl Stages {
                 errors = std::mem::take(&mut context.errors);
                 found
             })
+        } else if let Some(old) = tile.lines.as_ref().filter(|_| part != whole) {
+            let found = find_lines_in(part, &window, target, &lines.rules, Method::Exact);
+            found.with_others_outside(part, old, self.samples())
         } else {
             find_lines(&window, target, &lines.rules, Method::Exact, None)
         };
-        Found { lines: Some(Box::new(found)), errors, seconds: clock.seconds() }
+        let changed = match &tile.lines {
+            Some(old) => found.difference(old, self.samples()),
+            None => Some(whole),
+        };
+        Found { lines: Some(Box::new(found)), errors, changed, seconds: clock.seconds() }
     }
 
-    fn develop(&self, index: usize) -> FilmTile {
+    /// Develops a part of a tile.
+    fn develop(&self, index: usize, rect: PixelRect) -> FilmTile {
         let plan = &self.prepared.plan;
         let part = self.grid.around(index, plan.filter.reach());
         let of_tile = |tile: &usize| {
@@ -479,7 +525,7 @@ impl Stages {
         };
         let tiles = part.tiles.iter().map(of_tile).collect();
         let window = FilmWindow { origin: part.origin, tile: self.grid.tile, columns: part.columns, tiles };
-        develop(&window, self.grid.rect(index), &plan.filter, &plan.layers)
+        develop(&window, rect, &plan.filter, &plan.layers)
     }
 
     /// Puts a tile into the picture; whether anything differs from before.
@@ -498,8 +544,30 @@ impl Stages {
 struct Found {
     lines: Option<Box<LineBuffer>>,
     errors: ShadeErrors,
+    /// The pixels where they look otherwise than before.
+    changed: Option<PixelRect>,
     seconds: f64,
 }
+
+/// Notes as due what some pixels of a tile reach.
+fn around(
+    tiles: &mut [Tile],
+    grid: &Grid,
+    (index, pixels): (usize, PixelRect),
+    reach: i32,
+    due: impl Fn(&mut Tile) -> &mut Option<PixelRect>,
+) {
+    for near in grid.around(index, reach).tiles {
+        let part = pixels.grown(reach).intersection(&grid.rect(near));
+        if part.pixels() > 0 {
+            let due = due(&mut tiles[near]);
+            *due = Some(due.map_or(part, |due| due.union(&part)));
+        }
+    }
+}
+
+/// How many tiles a thread takes at once where most need next to nothing.
+const TILES_AT_ONCE: usize = 8;
 
 /// Whether a tile may see a material.
 fn sees(tile: &Tile, material: MaterialId) -> bool {
@@ -554,8 +622,9 @@ fn bring_up_to_date(
             let (new, old) = (&traced.samples, tile.samples.as_deref());
             let lit_lines = prepared.plan.lines.as_ref().is_some_and(|lines| lines.rules.read_light());
             sampled.pixels_changed = old != Some(new);
-            sampled.changed = sampled.pixels_changed
+            let changed = sampled.pixels_changed
                 && old.is_none_or(|old| (lit_lines && old.paths != new.paths) || !old.same_nodes(new));
+            sampled.changed = changed.then_some(rect);
             // Lines that let the sample's colour through have it mixed in.
             let covered = || tile.lines.as_ref().is_none_or(|lines| lines.lines.iter().all(|line| line.covers));
             sampled.own_lines_changed = old.is_none_or(|old| !old.same_colors(new)) && !covered();
@@ -571,7 +640,7 @@ fn bring_up_to_date(
     }
     let clock = CpuClock::thread();
     match (&prepared.plan.lines, &tile.samples) {
-        (Some(lines), Some(samples)) if sampled.changed || redo.bounds || tile.bounds.is_none() => {
+        (Some(lines), Some(samples)) if sampled.changed.is_some() || redo.bounds || tile.bounds.is_none() => {
             tile.bounds = Some(TileBounds::new(samples, &lines.rules));
         }
         (None, _) => tile.bounds = None,
@@ -599,7 +668,8 @@ fn restyle(
     let done = contexts.with(|context| {
         redo.restyle.iter().all(|material| match tracer.restyle(*material, shaders, samples, record, context) {
             Some(restyled) => {
-                sampled.changed |= restyled.changed;
+                let (one, other) = (sampled.changed, restyled.changed);
+                sampled.changed = one.zip(other).map(|(a, b)| a.union(&b)).or(one).or(other);
                 sampled.rays += restyled.rays;
                 sampled.hits[material.index()] += restyled.hits;
                 sampled.shade_seconds[material.index()] += restyled.seconds;
@@ -614,7 +684,7 @@ fn restyle(
     });
     sampled.seconds += clock.seconds();
     sampled.restyled = done;
-    sampled.pixels_changed = sampled.changed && prepared.plan.layers.contains(&Layer::Feature);
+    sampled.pixels_changed = sampled.changed.is_some() && prepared.plan.layers.contains(&Layer::Feature);
     if !done {
         // Half restyled: nobody knows how it was.
         tile.samples = None;

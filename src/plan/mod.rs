@@ -432,14 +432,7 @@ pub(crate) fn drawing_materials(scene: &Scene) -> Vec<bool> {
 
 /// The tests that are on for any material that draws lines.
 fn tests_in_play(scene: &Scene, draws: &[bool]) -> LineSettings {
-    let none = LineOverrides {
-        object: Some(false),
-        shader: Some(false),
-        uv: Some(None),
-        normal: Some(None),
-        feature: Some(None),
-        overlap: Some(None),
-    };
+    let none = LineOverrides::NO_TESTS;
     let drawing = scene.materials().iter().zip(draws).filter(|(_, draws)| **draws);
     drawing.map(|(material, _)| material.lines.over(scene.lines())).fold(none.over(scene.lines()), |all, one| {
         LineSettings {

@@ -303,6 +303,16 @@ pub struct LineOverrides {
 }
 
 impl LineOverrides {
+    /// All tests off.
+    pub(crate) const NO_TESTS: Self = Self {
+        object: Some(false),
+        shader: Some(false),
+        uv: Some(None),
+        normal: Some(None),
+        feature: Some(None),
+        overlap: Some(None),
+    };
+
     /// The settings with these changes.
     #[must_use]
     pub fn over(&self, settings: &LineSettings) -> LineSettings {

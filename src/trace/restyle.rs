@@ -11,7 +11,7 @@ use super::wave::{RayCounts, TileTracer, TraceContext, Work};
 use super::world::Hit;
 use crate::clock::CpuClock;
 use crate::plan::LINE_SLICE;
-use crate::sample::{Node, NodeColumns, NodePath, SampleBuffer};
+use crate::sample::{Node, NodeColumns, NodePath, PixelRect, SampleBuffer};
 use crate::scene::ids::{MaterialId, ObjectId};
 use crate::shade::{InputSet, Mode, PathKind, Shaders};
 
@@ -21,8 +21,8 @@ const GROUP: usize = 4096;
 /// What restyling a tile cost.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Restyled {
-    /// Whether any attribute differs from before.
-    pub changed: bool,
+    /// The pixels outside which no attribute differs from before.
+    pub changed: Option<PixelRect>,
     /// Hits that were shaded.
     pub hits: u64,
     /// Rays traced: towards lights that nobody had asked about before.
@@ -107,7 +107,9 @@ impl TileTracer<'_> {
                 }
                 restyled.hits += rows.len() as u64;
                 let style_of = constant.then_some(&style_of[..]);
-                restyled.changed |= samples.restyle((path, place), &rows, (&styles, style_of), &self.plan.layout)?;
+                if samples.restyle((path, place), &rows, (&styles, style_of), &self.plan.layout)? {
+                    restyled.changed = covering(restyled.changed, samples, (path, place), &rows);
+                }
             }
         }
         restyled.rays = work.rays;
@@ -167,4 +169,20 @@ fn hit_at(record: &TileRecord, path: NodePath, place: usize, sample: u32) -> Opt
         0 => record.node(path, sample)?.hit,
         _ => record.surface(path, place, sample),
     }
+}
+
+/// The least rectangle that covers another and the pixels of some rows of a tile's nodes.
+fn covering(
+    other: Option<PixelRect>,
+    samples: &SampleBuffer,
+    (path, place): (usize, usize),
+    rows: &[u32],
+) -> Option<PixelRect> {
+    let nodes = &samples.paths[path];
+    let nodes = place.checked_sub(1).map_or(nodes, |behind| &nodes.behind[behind]);
+    rows.iter().fold(other, |covered, row| {
+        let [x0, y0] = samples.pixel_of(nodes.rows.sample(*row as usize));
+        let pixel = PixelRect { x0, y0, x1: x0 + 1, y1: y0 + 1 };
+        Some(covered.map_or(pixel, |covered| covered.union(&pixel)))
+    })
 }

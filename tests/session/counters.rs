@@ -120,8 +120,49 @@ fn tint_runs_the_line_pass_and_the_film_alone() {
         let tinted = desk.replace(old, new);
         let redone = &tinted.redone;
         assert_eq!((rays(&tinted), redone.shaded, redone.restyled), (0, 0, 0), "{redone:?}");
-        assert!(redone.lined == redone.tiles && redone.developed > 0, "{redone:?}");
+        // Only where lines are seen in the mirror.
+        assert!(redone.lined > 0 && redone.lined < redone.tiles / 2 && redone.developed > 0, "{redone:?}");
+        desk.is_fresh(&tinted);
     }
+}
+
+#[test]
+fn a_threshold_concerns_the_tiles_where_pairs_lie_between() {
+    let mut desk = Desk::new();
+    desk.replace("normal = 40.0", "normal = 15.0");
+    // The ball bends less than that within a line's reach, whether seen itself or in the mirror.
+    let fewer = desk.replace("normal = 15.0", "normal = 100.0");
+    assert_eq!((rays(&fewer), fewer.redone.shaded, fewer.redone.restyled), (0, 0, 0), "{:?}", fewer.redone);
+    assert!(fewer.redone.lined > 0 && fewer.redone.lined < fewer.redone.tiles / 2, "{:?}", fewer.redone);
+    assert!(fewer.changed.pixels() > 0);
+    desk.is_fresh(&fewer);
+    // Nothing bends more.
+    let same = desk.replace("normal = 100.0", "normal = 120.0");
+    assert_eq!((rays(&same), same.redone.lined, same.redone.developed), (0, 0, 0), "{:?}", same.redone);
+    let more = desk.replace("normal = 120.0", "normal = 15.0");
+    assert!(more.redone.lined == fewer.redone.lined && more.changed == fewer.changed, "{:?}", more.redone);
+    desk.is_fresh(&more);
+}
+
+#[test]
+fn turning_a_test_off_and_on_shades_nothing() {
+    let mut desk = Desk::new();
+    for (old, new) in [("normal = 40.0", "normal = false"), ("normal = false", "normal = 40.0")] {
+        let turned = desk.replace(old, new);
+        let redone = &turned.redone;
+        assert_eq!((rays(&turned), redone.shaded, redone.restyled), (0, 0, 0), "{redone:?}");
+        desk.is_fresh(&turned);
+    }
+}
+
+#[test]
+fn turning_the_object_test_off_concerns_the_borders_of_objects() {
+    let mut desk = Desk::new();
+    desk.replace("normal = 40.0", "normal = 40.0\nobject = true");
+    let without = desk.replace("object = true", "object = false");
+    assert_eq!((rays(&without), without.redone.shaded), (0, 0), "{:?}", without.redone);
+    assert!(without.redone.lined > 0 && without.redone.lined < without.redone.tiles, "{:?}", without.redone);
+    desk.is_fresh(&without);
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! Random edits: every picture of a session equals a fresh one, bit for bit, whatever was kept for it.
 
 use tusche::film::Layer;
+use tusche::line::LineType;
 use tusche::live::{LivePicture, Session, SessionOptions};
 use tusche::render::RenderOptions;
 
@@ -18,10 +19,25 @@ const KNOBS: &[Knob] = &[
     ("minimum width", &["", "min_width = 2.0", "min_width = 0.0"]),
     ("line color", &["", "color = [0.5, 0.1, 0.0]"]),
     ("tint", &["", "tint = false", "compose = \"throughput\""]),
-    ("surfaces", &["", "", "surfaces = 2", "surfaces = 3"]),
+    ("object test", &["", "", "object = false"]),
+    ("shader test", &["", "", "shader = false"]),
+    ("overlap test", &["", "", "overlap = 0.5", "overlap = 2.0"]),
+    (
+        "surfaces",
+        &["", "", "surfaces = 2", "surfaces = 3", "surfaces = 2\nhidden = { width = 1.0, color = [0.5, 0.5, 0.0] }"],
+    ),
     ("widest", &["", "max_width = 4.0"]),
     ("paths", &["", "", "", "paths = [\"camera\"]"]),
-    ("types", &["", "types.crease = { width = 1.0 }"]),
+    (
+        "types",
+        &[
+            "",
+            "types.crease = { width = 1.0 }",
+            "types.crease = { color = [0.0, 0.5, 0.0] }",
+            "types.silhouette = { color = [0.5, 0.0, 0.0], opacity = 0.5 }",
+        ],
+    ),
+    ("ground's tests", &["", "", "lines = { normal = 20.0 }", "lines = { object = false, feature = 0.2 }"]),
     (
         "paint script",
         &[
@@ -73,10 +89,11 @@ const KNOBS: &[Knob] = &[
     ("depth", &["", "reflection_depth = 1", "refraction_depth = 0"]),
 ];
 
-const LAYERS: [&[Layer]; 3] = [
+const LAYERS: [&[Layer]; 4] = [
     &[Layer::Rgba],
     &[Layer::Rgba, Layer::Line, Layer::Normal, Layer::Feature],
     &[Layer::Color, Layer::Line, Layer::Depth, Layer::Object],
+    &[Layer::Rgba, Layer::LineType(LineType::Silhouette), Layer::LineType(LineType::Crease)],
 ];
 
 /// The number of a knob.
@@ -94,6 +111,9 @@ fn sources(places: &[usize]) -> Sources {
         "minimum width",
         "line color",
         "tint",
+        "object test",
+        "shader test",
+        "overlap test",
         "surfaces",
         "widest",
         "paths",
@@ -105,7 +125,7 @@ fn sources(places: &[usize]) -> Sources {
          [camera]\nposition = {camera}\ntarget = [0.0, 0.5, 0.0]\nfov = 40.0\n\
          [lines]\nwidth = {width}\n{lines}\n\
          [materials.paint]\nshader = \"paint.rhai\"\nparams = {{ paint = {paint}, ink = {ink} }}\n\
-         [materials.ground]\nshader = \"ground.rhai\"\n\
+         [materials.ground]\nshader = \"ground.rhai\"\n{ground}\n\
          [[objects]]\nname = \"ground\"\nshape = \"box\"\nsize = [5.0, 0.2, 5.0]\nmaterial = \"ground\"\ntranslate = [0.0, -0.1, 0.0]\n\
          [[objects]]\nname = \"a\"\nshape = \"sphere\"\nradius = 0.6\nmaterial = \"paint\"\ntranslate = {place}\n{object}\n\
          [[objects]]\nname = \"b\"\nshape = \"box\"\nsize = [0.8, 0.8, 0.8]\nmaterial = \"paint\"\ntranslate = [0.7, 0.4, 0.3]\n{other}\n\
@@ -118,6 +138,7 @@ fn sources(places: &[usize]) -> Sources {
         camera = text("camera"),
         width = text("width"),
         lines = lines.join("\n"),
+        ground = text("ground's tests"),
         paint = text("paint"),
         ink = text("ink"),
         place = text("place"),
