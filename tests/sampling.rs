@@ -253,7 +253,7 @@ fn a_quality_is_a_number_of_samples_that_can_be_explained() {
     let explained = |flags: &[&str]| place.run(&[&["explain", "scene.toml"], flags].concat()).exits(0).stdout();
     let plan = explained(&["--quality", "final"]);
     assert!(
-        plan.contains("64 samples per pixel\n")
+        plan.contains("64 sobol samples per pixel\n")
             && plan.contains("final: 64 samples per pixel, sampler sobol, where the scene says 4 and stratified"),
         "{plan}"
     );
@@ -269,7 +269,7 @@ fn a_quality_is_a_number_of_samples_that_can_be_explained() {
     let uncorrected = Settings { width_compensation: false, ..own };
     assert_eq!(Quality::Final.settings(&uncorrected), Settings { samples: 64, sampler: Sampler::Sobol, ..own });
     // What is set by itself has the last word.
-    assert!(explained(&["--quality", "draft", "--set", "render.samples=9"]).contains("9 samples per pixel\n"));
+    assert!(explained(&["--quality", "draft", "--set", "render.samples=9"]).contains("9 sobol samples per pixel\n"));
     let off = explained(&["--quality", "draft", "--set", "lines.width_compensation=false"]);
     assert!(off.contains("which the scene turns off"), "{off}");
     place.run(&["explain", "scene.toml", "--quality", "best"]).exits(2).says("draft").says("final");

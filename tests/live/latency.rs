@@ -60,6 +60,12 @@ fn latency_of_edits() {
     );
     for (name, file, from, to) in [
         ("line setting: `normal`", "scenes/fig4_default.toml", "normal = 60.0", ["normal = 40.0", "normal = 50.0"]),
+        (
+            "line setting: `normal`, edges of cylinders come and go",
+            "scenes/fig4_default.toml",
+            "normal = 60.0",
+            ["normal = 100.0", "normal = 60.0"],
+        ),
         ("line setting: `tint`", "scenes/fig4_default.toml", "tint = false", ["tint = true", "tint = false"]),
         ("line width in a script", "shaders/ink.rhai", "p.ink_width,", ["p.ink_width * 0.9,", "p.ink_width * 1.1,"]),
         (
