@@ -7,7 +7,7 @@
 use std::ops::{Range, RangeInclusive};
 
 use super::buffer::{Column, Node, NodeColumnSet, NodeColumns, PixelRect, Rows, SampleBuffer, SampleColor};
-use super::gate::{Faults, GateLog, clean_node};
+use super::gate::{Faults, GateLog, clean_color, clean_node, clean_offset};
 use super::path::NodePath;
 
 /// What a [`SampleBufferBuilder`] keeps.
@@ -62,11 +62,19 @@ impl SampleBufferBuilder {
     /// An empty buffer for a rectangle: black, transparent samples at their pixels' corners, without nodes.
     #[must_use]
     pub fn new(rect: PixelRect, layout: &SampleLayout) -> Self {
+        Self::with_places(rect, layout, vec![[0.0; 2]; rect.pixels() * layout.samples_per_pixel as usize])
+    }
+
+    /// The same with the samples at places in their pixels, each component 0 … 1.
+    #[must_use]
+    pub fn with_places(rect: PixelRect, layout: &SampleLayout, mut offset: Vec<[f32; 2]>) -> Self {
         let samples = rect.pixels() * layout.samples_per_pixel as usize;
+        offset.resize(samples, [0.0; 2]);
+        offset.iter_mut().for_each(|offset| *offset = clean_offset(*offset));
         let kept = |keep: bool| if keep { Column::Values(vec![[0.0; 3]; samples]) } else { Column::Constant([0.0; 3]) };
         Self {
             rect,
-            offset: vec![[0.0; 2]; samples],
+            offset,
             color: vec![[0.0; 3]; samples],
             alpha: vec![0.0; samples],
             position: kept(layout.position),
@@ -80,20 +88,43 @@ impl SampleBufferBuilder {
         }
     }
 
+    /// Where in their pixels all samples lie.
+    #[must_use]
+    pub fn places(&self) -> &[[f32; 2]] {
+        &self.offset
+    }
+
     /// Sets a sample's place in its pixel (each component 0 … 1) and its colour. The gate checks the colour; `shader`
     /// is who made it.
     ///
     /// # Panics
-    /// If the rectangle has no such sample. So do [`Self::set_extras`] and [`Self::push`].
+    /// If the rectangle has no such sample. So do [`Self::set_color`], [`Self::set_extras`] and [`Self::push`].
     pub fn set_sample(&mut self, sample: u32, offset: [f32; 2], color: SampleColor, shader: u32) {
-        let mut faults = Faults::default();
-        let [alpha] = faults.numbers([color.alpha]);
-        let clean = faults.numbers(color.color);
+        self.offset[sample as usize] = clean_offset(offset);
+        self.set_color(sample, color, shader);
+    }
+
+    /// Sets a sample's colour, made by `shader`, as the gate lets it pass.
+    #[inline]
+    pub fn set_color(&mut self, sample: u32, color: SampleColor, shader: u32) {
+        let (SampleColor { color, alpha }, faults) = clean_color(color);
         self.gate.note(NodePath::CAMERA, sample, shader, faults);
-        // The bounds of the line search rely on the range.
-        self.offset[sample as usize] = Faults::default().numbers(offset).map(|x| x.clamp(0.0, 1.0));
-        self.color[sample as usize] = clean;
+        self.color[sample as usize] = color;
         self.alpha[sample as usize] = alpha;
+    }
+
+    /// Sets one colour of a row of samples; no shader made it.
+    ///
+    /// # Panics
+    /// If the rectangle has not all of them.
+    pub fn set_same_color(&mut self, samples: Range<u32>, color: SampleColor) {
+        let (SampleColor { color, alpha }, faults) = clean_color(color);
+        let places = samples.start as usize..samples.end as usize;
+        self.color[places.clone()].fill(color);
+        self.alpha[places].fill(alpha);
+        if !faults.is_empty() {
+            samples.for_each(|sample| self.gate.note(NodePath::CAMERA, sample, 0, faults));
+        }
     }
 
     /// Sets what only the camera's node of a sample keeps: position and extra outputs (as many as the layout says).
@@ -118,49 +149,88 @@ impl SampleBufferBuilder {
     ///
     /// # Panics
     /// If the rectangle has no such sample, or `surface` is 0.
-    pub fn push_behind(&mut self, path: NodePath, surface: usize, sample: u32, node: Node) {
-        assert!((sample as usize) < self.offset.len(), "sample {sample} lies outside the buffer");
+    pub fn push_behind(&mut self, path: NodePath, surface: usize, sample: u32, mut node: Node) {
+        self.check(sample);
         assert!(surface > 0, "the first surface is the node itself");
         if node.object == 0 {
             return;
         }
         let kept = NodeColumnSet { throughput: false, contribution: false, ..self.layout.columns };
-        let (node, faults) = clean_node(node, kept, self.layout.max_width_of(node.shader));
+        let faults = clean_node(&mut node, kept, &self.layout);
         self.gate.note(path, sample, node.shader, faults);
         let place = self.behind.iter().position(|(rows, of)| *of == surface && rows.path == path);
         let place = place.unwrap_or_else(|| {
             self.behind.push((PathRows::new(path, 0), surface));
             self.behind.len() - 1
         });
-        self.behind[place].0.push(sample, &node, kept);
+        self.behind[place].0.extend(sample..sample + 1, std::iter::once(&node), kept);
     }
 
     /// Adds a node; of several at one path of one sample the first stays. Columns that the layout does not keep are
     /// dropped here; the gate checks the others.
-    pub fn push(&mut self, path: NodePath, sample: u32, node: Node) {
+    pub fn push(&mut self, path: NodePath, sample: u32, mut node: Node) {
+        self.push_clean(path, sample..sample + 1, &mut node);
+    }
+
+    /// Adds one and the same node to a row of samples, none of which has a node at its path yet.
+    ///
+    /// # Panics
+    /// If the rectangle has not all of them. So does [`Self::push_row`].
+    pub fn push_same(&mut self, path: NodePath, samples: RangeInclusive<u32>, mut node: Node) {
+        let (&first, &last) = (samples.start(), samples.end());
+        let faults = self.push_clean(path, first..first + 1, &mut node);
+        if first == last {
+            return;
+        }
+        self.check(last);
+        if !faults.is_empty() {
+            samples.skip(1).for_each(|sample| self.gate.note(path, sample, node.shader, faults));
+        }
+        let columns = self.layout.columns;
+        self.rows_of(path).repeat(first + 1..last + 1, columns);
+    }
+
+    /// Adds the nodes of a row of samples, as [`Self::push`] does: for each sample the one at its place among `nodes`, which are left as
+    /// the gate lets them pass.
+    pub fn push_row(
+        &mut self,
+        path: NodePath,
+        samples: Range<u32>,
+        nodes: &mut [Node],
+        places: impl Iterator<Item = usize> + Clone,
+    ) {
+        self.check(samples.end - 1);
+        for (sample, place) in samples.clone().zip(places.clone()) {
+            let node = &mut nodes[place];
+            let faults = clean_node(node, self.layout.columns, &self.layout);
+            self.gate.note(path, sample, node.shader, faults);
+        }
+        let columns = self.layout.columns;
+        let nodes = &*nodes;
+        self.rows_of(path).extend(samples, places.map(|place| &nodes[place]), columns);
+    }
+
+    fn push_clean(&mut self, path: NodePath, sample: Range<u32>, node: &mut Node) -> Faults {
+        self.check(sample.start);
+        let faults = clean_node(node, self.layout.columns, &self.layout);
+        self.gate.note(path, sample.start, node.shader, faults);
+        let columns = self.layout.columns;
+        self.rows_of(path).extend(sample, std::iter::once(&*node), columns);
+        faults
+    }
+
+    fn check(&self, sample: u32) {
         assert!((sample as usize) < self.offset.len(), "sample {sample} lies outside the buffer");
-        let (node, faults) = clean_node(node, self.layout.columns, self.layout.max_width_of(node.shader));
-        self.gate.note(path, sample, node.shader, faults);
+    }
+
+    fn rows_of(&mut self, path: NodePath) -> &mut PathRows {
         if self.paths[self.last].path != path {
             self.last = self.paths.iter().position(|rows| rows.path == path).unwrap_or_else(|| {
                 self.paths.push(PathRows::new(path, 0));
                 self.paths.len() - 1
             });
         }
-        self.paths[self.last].push(sample, &node, self.layout.columns);
-    }
-
-    /// Adds one and the same node to a row of samples, none of which has a node at its path yet.
-    pub fn push_same(&mut self, path: NodePath, samples: RangeInclusive<u32>, node: Node) {
-        let (&first, &last) = (samples.start(), samples.end());
-        self.push(path, first, node);
-        if first == last {
-            return;
-        }
-        assert!((last as usize) < self.offset.len(), "sample {last} lies outside the buffer");
-        let (node, faults) = clean_node(node, self.layout.columns, self.layout.max_width_of(node.shader));
-        samples.skip(1).for_each(|sample| self.gate.note(path, sample, node.shader, faults));
-        self.paths[self.last].repeat(first + 1..last + 1, self.layout.columns);
+        &mut self.paths[self.last]
     }
 
     /// Sorts the nodes and closes the buffer. A sample without a camera node gets a miss.
@@ -212,7 +282,7 @@ impl SampleBufferBuilder {
             present[camera.samples.get(row) as usize] = true;
         }
         for sample in (0..).zip(present).filter_map(|(sample, present)| (!present).then_some(sample)) {
-            camera.push(sample, &Node::default(), self.layout.columns);
+            camera.extend(sample..sample + 1, std::iter::once(&Node::default()), self.layout.columns);
         }
     }
 }
@@ -267,7 +337,15 @@ impl RowSamples {
         self.listed.as_ref().map_or(row as u32, |listed| listed[row])
     }
 
-    #[inline]
+    /// Adds rows for samples that follow each other.
+    fn extend(&mut self, samples: Range<u32>, expected: usize) {
+        if self.listed.is_none() && samples.start == self.count {
+            self.count = samples.end;
+        } else {
+            samples.for_each(|sample| self.push(sample, expected));
+        }
+    }
+
     fn push(&mut self, sample: u32, expected: usize) {
         match &mut self.listed {
             None if sample == self.count => self.count += 1,
@@ -312,53 +390,52 @@ impl PathRows {
         }
     }
 
-    fn push(&mut self, sample: u32, node: &Node, kept: NodeColumnSet) {
+    /// Adds the nodes of samples that follow each other: column by column, which is quicker than node by node.
+    fn extend<'n>(&mut self, samples: Range<u32>, nodes: impl Iterator<Item = &'n Node> + Clone, kept: NodeColumnSet) {
         let (row, expected) = (self.samples.len(), self.expected);
-        self.samples.push(sample, expected);
-        self.object.push(row, node.object, expected);
-        self.shader.push(row, node.shader, expected);
+        self.samples.extend(samples, expected);
+        self.object.extend(row, nodes.clone().map(|node| node.object), expected);
+        self.shader.extend(row, nodes.clone().map(|node| node.shader), expected);
         if kept.depth {
-            self.depth.push(row, node.depth, expected);
+            self.depth.extend(row, nodes.clone().map(|node| node.depth), expected);
         }
         if kept.uv {
-            self.uv.push(row, node.uv, expected);
+            self.uv.extend(row, nodes.clone().map(|node| node.uv), expected);
         }
         if kept.normal {
-            self.normal.push(row, node.normal, expected);
+            self.normal.extend(row, nodes.clone().map(|node| node.normal), expected);
         }
         if kept.feature {
-            self.feature.push(row, node.feature, expected);
+            self.feature.extend(row, nodes.clone().map(|node| node.feature), expected);
         }
         if kept.lines {
-            self.line_color.push(row, node.line_color, expected);
-            self.line_width.push(row, node.line_width, expected);
-            self.line_opacity.push(row, node.line_opacity, expected);
-            self.priority.push(row, node.priority, expected);
+            self.line_color.extend(row, nodes.clone().map(|node| node.line_color), expected);
+            self.line_width.extend(row, nodes.clone().map(|node| node.line_width), expected);
+            self.line_opacity.extend(row, nodes.clone().map(|node| node.line_opacity), expected);
+            self.priority.extend(row, nodes.clone().map(|node| node.priority), expected);
         }
         if kept.member {
-            self.member.push(row, node.member, expected);
+            self.member.extend(row, nodes.clone().map(|node| node.member), expected);
         }
         if kept.overlap || kept.position {
-            self.position.push(row, node.position, expected);
+            self.position.extend(row, nodes.clone().map(|node| node.position), expected);
         }
         if kept.overlap {
-            self.geometric_normal.push(row, node.geometric_normal, expected);
-            self.footprint.push(row, node.footprint, expected);
+            self.geometric_normal.extend(row, nodes.clone().map(|node| node.geometric_normal), expected);
+            self.footprint.extend(row, nodes.clone().map(|node| node.footprint), expected);
         }
         if kept.throughput {
-            self.throughput.push(row, node.throughput, expected);
+            self.throughput.extend(row, nodes.clone().map(|node| node.throughput), expected);
         }
         if kept.contribution {
-            self.contribution.push(row, node.contribution, expected);
+            self.contribution.extend(row, nodes.map(|node| node.contribution), expected);
         }
     }
 
     /// Gives further samples the node of the last row.
     fn repeat(&mut self, samples: Range<u32>, kept: NodeColumnSet) {
         let count = samples.len();
-        for sample in samples {
-            self.samples.push(sample, self.expected);
-        }
+        self.samples.extend(samples, self.expected);
         self.object.repeat(count);
         self.shader.repeat(count);
         if kept.depth {
@@ -473,6 +550,19 @@ impl<T: Copy + PartialEq> Column<T> {
                 places.resize(row, 0);
                 places.push(1);
                 *self = Self::Palette { values: vec![*constant, value], places };
+            }
+        }
+    }
+
+    /// Appends values from row number `row` on.
+    fn extend(&mut self, row: usize, mut values: impl Iterator<Item = T>, expected: usize) {
+        let mut row = row;
+        while let Some(value) = values.next() {
+            self.push(row, value, expected);
+            row += 1;
+            if let Self::Values(all) = self {
+                all.extend(values);
+                return;
             }
         }
     }

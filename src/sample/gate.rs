@@ -10,7 +10,8 @@
 
 use bitflags::bitflags;
 
-use super::buffer::{Node, NodeColumnSet};
+use super::buffer::{Node, NodeColumnSet, SampleColor};
+use super::builder::SampleLayout;
 use super::path::NodePath;
 use crate::math::DVec3;
 
@@ -118,14 +119,30 @@ impl Faults {
     }
 }
 
-/// A node as the buffer may hold it, and what was wrong with it. Columns that are not kept are left as they came.
-pub(super) fn clean_node(node: Node, kept: NodeColumnSet, max_width: f32) -> (Node, Faults) {
+/// A place in a pixel as the buffer may hold it: the bounds of the line search rely on 0 … 1.
+#[inline]
+pub(super) fn clean_offset(offset: [f32; 2]) -> [f32; 2] {
+    offset.map(|x| if x.abs() <= LARGEST { (x + 0.0).clamp(0.0, 1.0) } else { 0.0 })
+}
+
+/// A colour as the buffer may hold it, and what was wrong with it.
+#[inline]
+pub(super) fn clean_color(SampleColor { color, alpha }: SampleColor) -> (SampleColor, Faults) {
+    let mut faults = Faults::default();
+    let [alpha] = faults.numbers([alpha]);
+    let color = faults.numbers(color);
+    (SampleColor { color, alpha }, faults)
+}
+
+/// Makes a node what the buffer may hold; returns what was wrong with it. Columns that are not kept are left as they came.
+pub(super) fn clean_node(node: &mut Node, kept: NodeColumnSet, layout: &SampleLayout) -> Faults {
     let mut faults = Faults::default();
     // A miss has neither place nor style, only what it adds to the picture.
-    let mut node = match node.object {
-        0 => Node { throughput: node.throughput, contribution: node.contribution, ..Node::default() },
-        _ => Node { depth: faults.depth(node.depth), ..node },
-    };
+    if node.object == 0 {
+        *node = Node { throughput: node.throughput, contribution: node.contribution, ..Node::default() };
+    } else {
+        node.depth = faults.depth(node.depth);
+    }
     if kept.uv {
         node.uv = faults.numbers(node.uv);
     }
@@ -137,7 +154,7 @@ pub(super) fn clean_node(node: Node, kept: NodeColumnSet, max_width: f32) -> (No
     }
     if kept.lines {
         node.line_color = faults.numbers(node.line_color);
-        node.line_width = faults.width(node.line_width, max_width);
+        node.line_width = faults.width(node.line_width, layout.max_width_of(node.shader));
         node.line_opacity = faults.number(node.line_opacity).clamp(0.0, 1.0);
     }
     if kept.overlap || kept.position {
@@ -153,7 +170,7 @@ pub(super) fn clean_node(node: Node, kept: NodeColumnSet, max_width: f32) -> (No
     if kept.contribution {
         node.contribution = faults.numbers(node.contribution);
     }
-    (node, faults)
+    faults
 }
 
 /// What a script makes of a line, as it may be drawn: the neutral values are those of a node's line.

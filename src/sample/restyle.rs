@@ -21,7 +21,8 @@ impl SampleBuffer {
         let kept = NodeColumnSet { feature, lines, ..NodeColumnSet::default() };
         let mut clean = Vec::with_capacity(styles.len());
         for style in styles {
-            let (style, faults) = clean_node(Node { depth: 0.0, ..*style }, kept, layout.max_width_of(style.shader));
+            let mut style = Node { depth: 0.0, ..*style };
+            let faults = clean_node(&mut style, kept, layout);
             if !faults.is_empty() {
                 return None;
             }

@@ -9,7 +9,7 @@ use std::ops::Range;
 use super::eight::{Eights, Task, dispatch};
 use super::packet::Bundle;
 use super::tree::{Leaf, Visitor};
-use super::wave::{FilmPlaces, TileTracer};
+use super::wave::{FilmPacket, TileTracer};
 use super::world::World;
 use crate::math::Vec3;
 use crate::sample::{Node, NodePath, PixelRect, SampleBufferBuilder, SampleColor};
@@ -84,34 +84,33 @@ impl TileTracer<'_> {
         runs
     }
 
-    /// Stores the samples of pixels that show the background alone.
+    /// Stores the samples of pixels that show the background alone: their colours, as extra outputs and positions are 0 from the start.
     pub(super) fn store_clear(&self, rect: PixelRect, pixels: Range<usize>, samples: &mut SampleBufferBuilder) {
-        let layout = &self.plan.layout;
-        let per_pixel = layout.samples_per_pixel;
-        let even = self.lighting.even_background();
+        let film = self.film(rect, samples);
+        let [first, end] = [pixels.start, pixels.end].map(|pixel| (pixel * film.per_pixel) as u32);
         let node = |radiance: Vec3| Node { contribution: radiance.to_array(), ..Node::default() };
         let alpha = if self.transparent { 0.0 } else { 1.0 };
-        let extras = vec![[0.0; 3]; layout.aovs];
-        let mut places = self.film_places(rect, pixels.clone());
-        while let Some(FilmPlaces { samples: numbers, film, count }) = FilmPlaces::next(&mut places) {
-            // Only an uneven background asks where rays go.
-            let rays = even.is_none().then(|| self.world.camera_packet(&self.rays, &film, count));
-            for lane in 0..count {
-                let towards = rays.as_ref().map_or(Vec3::ZERO, |rays| rays.ray_start(lane).1);
-                let radiance = even.unwrap_or_else(|| self.lighting.background(towards));
-                let sample = numbers[lane];
-                samples.set_sample(sample, film[lane].1, SampleColor { color: radiance.to_array(), alpha }, 0);
-                if layout.position || layout.aovs > 0 {
-                    samples.set_extras(sample, [0.0; 3], &extras);
-                }
-                if layout.columns.contribution {
+        let color = |radiance: Vec3| SampleColor { color: radiance.to_array(), alpha };
+        let same = if let Some(radiance) = self.lighting.even_background() {
+            samples.set_same_color(first..end, color(radiance));
+            Some(radiance)
+        } else {
+            let mut background = Vec::with_capacity((end - first) as usize);
+            for FilmPacket { places, count, .. } in film.packets(pixels) {
+                let rays = self.world.camera_packet(&self.rays, &places, count);
+                background.extend((0..count).map(|lane| self.lighting.background(rays.ray_start(lane).1)));
+            }
+            let keeps_contribution = self.plan.layout.columns.contribution;
+            for (sample, radiance) in (first..end).zip(background) {
+                samples.set_color(sample, color(radiance), 0);
+                if keeps_contribution {
                     samples.push(NodePath::CAMERA, sample, node(radiance));
                 }
             }
-        }
-        if !layout.columns.contribution && !pixels.is_empty() {
-            let [first, end] = [pixels.start, pixels.end].map(|pixel| pixel as u32 * per_pixel);
-            samples.push_same(NodePath::CAMERA, first..=end - 1, node(Vec3::ZERO));
+            (!keeps_contribution).then_some(Vec3::ZERO)
+        };
+        if let Some(radiance) = same.filter(|_| first < end) {
+            samples.push_same(NodePath::CAMERA, first..=end - 1, node(radiance));
         }
     }
 }

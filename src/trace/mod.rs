@@ -4,7 +4,7 @@
 //! - [`tree`]: bounding volume hierarchies and the traversal they share; [`mesh_tree`]: one over the triangles of a mesh.
 //! - [`world`]: one hierarchy over the objects; closest hits and shadow rays. `hits` settles which hit of a ray comes first.
 //! - [`packet`], [`world_packet`]: the same for sixteen rays that go much the same way.
-//! - [`surface`]: from a hit to a place with normals, texture coordinates and error bounds.
+//! - [`surface`]: from a hit to a place with normals, texture coordinates and error bounds; `surface_lanes`: sixteen at a time.
 //! - [`wave`]: the rays of a tile, one depth of the ray tree at a time; `shadow` finds what lights give a hit, `scatter`
 //!   shades hits and sends rays on; `media` knows which bodies of glass a ray is in; `list` keeps what the line pass wants to
 //!   know of surfaces behind the first.
@@ -28,6 +28,7 @@ mod restyle;
 mod scatter;
 mod shadow;
 pub mod surface;
+mod surface_lanes;
 pub mod tree;
 pub mod triangle;
 pub mod wave;

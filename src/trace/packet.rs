@@ -48,7 +48,7 @@ pub(super) fn largest(lanes: &Lanes) -> f32 {
 
 /// Vectors by axis, times a matrix.
 #[inline(always)]
-fn product(matrix: &Mat3, [x, y, z]: &[Lanes; 3]) -> [Lanes; 3] {
+pub(super) fn product(matrix: &Mat3, [x, y, z]: &[Lanes; 3]) -> [Lanes; 3] {
     let [mx, my, mz] = matrix.to_cols_array_2d();
     [0, 1, 2].map(|axis: usize| {
         let (mx, my, mz) = (mx[axis], my[axis], mz[axis]);

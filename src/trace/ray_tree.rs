@@ -109,8 +109,8 @@ pub(super) struct WaveHit {
 /// A run of samples: their trees so far, and the rays that are still to be traced.
 #[derive(Debug, Default)]
 pub(super) struct Run {
-    /// Where in their pixels the camera rays start.
-    pub offsets: Vec<[f32; 2]>,
+    /// How many of the nodes are the camera's.
+    pub roots: usize,
     /// All nodes; those of the camera come first, children stand after their parents.
     pub nodes: Vec<TreeNode>,
     /// What the line pass will see of nodes that are no misses.
@@ -140,7 +140,7 @@ impl Run {
     pub fn clear(&mut self) {
         // The record is told whether it is wanted.
         let Self {
-            offsets,
+            roots,
             nodes,
             attributes,
             again,
@@ -153,7 +153,7 @@ impl Run {
             aovs,
             record: _,
         } = self;
-        offsets.clear();
+        *roots = 0;
         nodes.clear();
         attributes.clear();
         again.clear();

@@ -15,6 +15,7 @@ use super::packet::{LANES, RayPacket};
 use super::ray_tree::{Run, TreeNode, WaveHit, WaveRay};
 use super::record::TileRecord;
 use super::surface::Surface;
+use super::surface_lanes::SurfaceLanes;
 use super::triangle::Ray;
 use super::world::{Hit, World};
 use crate::clock::CpuClock;
@@ -64,30 +65,58 @@ impl std::ops::AddAssign for RayCounts {
     }
 }
 
-/// Places of samples on the film, a packet at a time.
-pub(super) struct FilmPlaces {
-    /// Numbers of the samples in the tile.
-    pub samples: [u32; LANES],
+/// Samples of a tile on the film.
+pub(super) struct Film<'a> {
+    pub rect: PixelRect,
+    pub per_pixel: usize,
+    /// Places in their pixels of all samples of the tile.
+    pub offsets: &'a [[f32; 2]],
+}
+
+/// A packet of them.
+pub(super) struct FilmPacket {
+    /// Number in the tile of the first; the others follow.
+    pub first: u32,
     /// Pixels and places in them. Behind the last, it is repeated.
-    pub film: [([i32; 2], [f32; 2]); LANES],
+    pub places: [([i32; 2], [f32; 2]); LANES],
     /// How many there are, at least 1.
     pub count: usize,
 }
 
-impl FilmPlaces {
-    /// Those that come next, if any do.
+impl Film<'_> {
+    /// The samples of some pixels of the tile, one by one: number in the tile, pixel, and place in the pixel.
+    fn samples(&self, pixels: Range<usize>) -> impl Iterator<Item = (u32, [i32; 2], [f32; 2])> {
+        self.packets(pixels).flat_map(|packet| {
+            let FilmPacket { first, places, count } = packet;
+            (first..).zip(places).take(count).map(|(sample, (pixel, offset))| (sample, pixel, offset))
+        })
+    }
+
+    /// The samples of some pixels of the tile, packet by packet.
+    pub fn packets(&self, pixels: Range<usize>) -> impl Iterator<Item = FilmPacket> {
+        let end = pixels.end * self.per_pixel;
+        (pixels.start * self.per_pixel..end).step_by(LANES).map(move |first| self.packet(first, LANES.min(end - first)))
+    }
+
+    /// Some samples, at least one, from a number on.
     #[inline]
-    pub fn next(places: &mut impl Iterator<Item = (u32, [i32; 2], [f32; 2])>) -> Option<Self> {
-        let (mut samples, mut film) = ([0; LANES], [([0; 2], [0.0; 2]); LANES]);
-        let mut count = 0;
-        for (sample, pixel, offset) in places.take(LANES) {
-            samples[count] = sample;
-            film[count] = (pixel, offset);
-            count += 1;
+    fn packet(&self, first: usize, count: usize) -> FilmPacket {
+        let Self { rect, per_pixel, offsets } = self;
+        let mut places = [([0; 2], [0.0; 2]); LANES];
+        let width = rect.width() as usize;
+        let (mut pixel, mut within) = (first / per_pixel, first % per_pixel);
+        let mut lane = 0;
+        while lane < count {
+            let at = [rect.x0 + (pixel % width) as i32, rect.y0 + (pixel / width) as i32];
+            let end = count.min(lane + per_pixel - within);
+            for (place, offset) in places[lane..end].iter_mut().zip(&offsets[first + lane..]) {
+                *place = (at, *offset);
+            }
+            (pixel, within, lane) = (pixel + 1, 0, end);
         }
-        let last = film[count.checked_sub(1)?];
-        film[count..].fill(last);
-        Some(Self { samples, film, count })
+        let last = places[count - 1];
+        places[count..].fill(last);
+        FilmPacket { first: first as u32, places, count }
     }
 }
 
@@ -212,8 +241,10 @@ impl<'a> TileTracer<'a> {
         let clock = CpuClock::thread();
         let mut work = Work { known: memory.known, ..Work::new(self.scene.materials().len()) };
         let mut record = memory.keep.then(|| TileRecord::new(self.lighting.len()));
-        let mut samples = SampleBufferBuilder::new(rect, &self.plan.layout);
-        let per_pixel = self.plan.layout.samples_per_pixel as usize;
+        let layout = &self.plan.layout;
+        let per_pixel = layout.samples_per_pixel as usize;
+        let offsets = self.positions.of_rect(self.world.arch, &rect, layout.samples_per_pixel);
+        let mut samples = SampleBufferBuilder::with_places(rect, layout, offsets);
         let run_samples = if self.plan.has_secondary_rays() { RUN_SAMPLES_BRANCHING } else { RUN_SAMPLES };
         let run_pixels = (run_samples / per_pixel).max(1);
         // A record has to know of every ray.
@@ -248,13 +279,15 @@ impl<'a> TileTracer<'a> {
         let mut run = std::mem::take(&mut context.run);
         run.clear();
         run.record.clear(record.is_some(), self.lighting.len());
-        let count = pixels.len() * self.plan.layout.samples_per_pixel as usize;
+        let film = self.film(rect, samples);
+        let count = pixels.len() * film.per_pixel;
+        run.roots = count;
         run.positions.resize(if self.plan.layout.position { count } else { 0 }, Vec3::ZERO);
         run.aovs.resize(count * self.plan.layout.aovs, Vec3::ZERO);
         if self.camera_rays_are_plain(work) {
-            self.run_camera_wave(rect, pixels, &mut run, context, work);
+            self.run_camera_wave(&film, pixels, &mut run, context, work);
         } else {
-            self.start(rect, pixels, &mut run);
+            self.start(&film, pixels, &mut run);
             if !self.plan.bodies.is_empty() {
                 self.start_in_media(&mut run, context, work);
             }
@@ -265,7 +298,7 @@ impl<'a> TileTracer<'a> {
         }
         run.gather_radiance();
         run.surfaces.sort_by_key(|&(node, place, ..)| (place, node));
-        self.store(&run, samples);
+        self.store(&mut run, samples);
         if let Some(record) = record {
             record.add(&run);
         }
@@ -273,30 +306,19 @@ impl<'a> TileTracer<'a> {
     }
 
     /// Makes the camera rays of a run of pixels the next wave.
-    fn start(&self, rect: PixelRect, pixels: Range<usize>, run: &mut Run) {
-        for (sample, pixel, offset) in self.film_places(rect, pixels) {
+    fn start(&self, film: &Film<'_>, pixels: Range<usize>, run: &mut Run) {
+        for (sample, pixel, offset) in film.samples(pixels) {
             let (origin, direction) = self.rays.ray(pixel, offset);
             let node = run.nodes.len() as u32;
             run.next.push(WaveRay { origin, direction, node, after: None, passed: 0, media: 0, counted: 0 });
             run.nodes.push(TreeNode::root(sample, self.cone));
-            run.offsets.push(offset);
         }
     }
 
-    /// The samples of a run of pixels: number in the tile, pixel, and place in the pixel.
-    pub(super) fn film_places(
-        &self,
-        rect: PixelRect,
-        pixels: Range<usize>,
-    ) -> impl Iterator<Item = (u32, [i32; 2], [f32; 2])> {
-        let per_pixel = self.plan.layout.samples_per_pixel;
-        let width = rect.width() as usize;
-        pixels.flat_map(move |index| {
-            let pixel = [rect.x0 + (index % width) as i32, rect.y0 + (index / width) as i32];
-            let positions = self.positions.of_pixel(pixel);
-            let place = move |sample| (index as u32 * per_pixel + sample, pixel, positions.offset(sample));
-            (0..per_pixel).map(place)
-        })
+    /// The samples of a tile on the film.
+    pub(super) fn film<'s>(&self, rect: PixelRect, samples: &'s SampleBufferBuilder) -> Film<'s> {
+        let per_pixel = self.plan.layout.samples_per_pixel as usize;
+        Film { rect, per_pixel, offsets: samples.places() }
     }
 
     /// Traces and shades one wave; what it mirrors and refracts becomes the next.
@@ -331,29 +353,31 @@ impl<'a> TileTracer<'a> {
     /// Wave 0 where camera rays are plain: in packets from the film to what they meet. What misses everything is done at once.
     fn run_camera_wave(
         &self,
-        rect: PixelRect,
+        film: &Film<'_>,
         pixels: Range<usize>,
         run: &mut Run,
         context: &mut TraceContext<'_>,
         work: &mut Work<'_>,
     ) {
-        let mut places = self.film_places(rect, pixels);
         let mut hits = std::mem::take(&mut context.wave_hits);
-        while let Some(FilmPlaces { samples, film, count }) = FilmPlaces::next(&mut places) {
-            let (rays, met) = self.world.closest_of_camera(&self.rays, &film, count);
+        for FilmPacket { first, places, count } in film.packets(pixels) {
+            let (rays, met) = self.world.closest_of_camera(&self.rays, &places, count);
+            let surfaces = SurfaceLanes::new(self.world, &met);
             work.rays.camera += count as u64;
             for lane in 0..count {
                 let node = run.nodes.len() as u32;
                 let (origin, direction) = rays.ray_start(lane);
                 let ray = WaveRay { origin, direction, node, after: None, passed: 0, media: 0, counted: 0 };
                 run.record.note(&ray, met[lane].as_ref(), true);
-                let mut root = TreeNode::root(samples[lane], self.cone);
+                let mut root = TreeNode::root(first + lane as u32, self.cone);
                 match met[lane] {
-                    Some(hit) => hits.push(self.wave_hit(&ray, &hit, &root, 0)),
+                    Some(hit) => {
+                        let surface = surfaces.surface(lane, self.world, direction, &hit);
+                        hits.push(self.hit_of(&ray, &hit, surface, &root, 0));
+                    }
                     None => self.miss(&mut root, direction),
                 }
                 run.nodes.push(root);
-                run.offsets.push(film[lane].1);
             }
         }
         self.shade_hits(&mut hits, run, context, work);
@@ -465,10 +489,16 @@ impl<'a> TileTracer<'a> {
     /// A hit on its way to be shaded.
     #[inline]
     pub(super) fn wave_hit(&self, from: &WaveRay, hit: &Hit, node: &TreeNode, place: usize) -> WaveHit {
+        self.hit_of(from, hit, Surface::new(self.world, from.direction, hit), node, place)
+    }
+
+    /// The same of a surface that is known.
+    #[inline]
+    fn hit_of(&self, from: &WaveRay, hit: &Hit, surface: Surface, node: &TreeNode, place: usize) -> WaveHit {
         WaveHit {
             ray: *from,
             hit: *hit,
-            surface: Surface::new(self.world, from.direction, hit),
+            surface,
             material: self.world.material(hit),
             depth: node.length_before + hit.t,
             place: place as u32,
@@ -477,12 +507,12 @@ impl<'a> TileTracer<'a> {
     }
 
     /// Hands the nodes of a run to the sample buffer.
-    fn store(&self, run: &Run, samples: &mut SampleBufferBuilder) {
+    fn store(&self, run: &mut Run, samples: &mut SampleBufferBuilder) {
         let layout = &self.plan.layout;
-        let roots = &run.nodes[..run.offsets.len()];
-        for (node, offset) in roots.iter().zip(&run.offsets) {
+        let roots = &run.nodes[..run.roots];
+        for node in roots {
             let color = SampleColor { color: node.radiance.to_array(), alpha: node.alpha };
-            samples.set_sample(node.sample, *offset, color, node.culprit);
+            samples.set_color(node.sample, color, node.culprit);
         }
         if layout.position || layout.aovs > 0 {
             let mut extras = Vec::with_capacity(layout.aovs);
@@ -497,26 +527,35 @@ impl<'a> TileTracer<'a> {
         let kept = if self.plan.lines.is_some() { run.nodes.len() } else { roots.len() };
         let (roots, others) = run.nodes[..kept].split_at(roots.len());
         let is_plain_miss = |node: &TreeNode| node.attributes == TreeNode::MISS && !layout.columns.contribution;
-        for nodes in roots.chunk_by(|a, b| is_plain_miss(a) && is_plain_miss(b)) {
+        for nodes in roots.chunk_by(|a, b| is_plain_miss(a) == is_plain_miss(b)) {
             let (first, last) = (nodes[0].sample, nodes[nodes.len() - 1].sample);
-            samples.push_same(NodePath::CAMERA, first..=last, self.attributes_of(run, &nodes[0]));
+            if is_plain_miss(&nodes[0]) {
+                samples.push_same(NodePath::CAMERA, first..=last, attributes_of(&run.attributes, &nodes[0]));
+            } else if layout.columns.contribution {
+                for node in nodes {
+                    samples.push(NodePath::CAMERA, node.sample, attributes_of(&run.attributes, node));
+                }
+            } else {
+                // Of the camera's nodes, throughput is 1.
+                let places = nodes.iter().map(|node| node.attributes as usize);
+                samples.push_row(NodePath::CAMERA, first..last + 1, &mut run.attributes, places);
+            }
         }
         for node in others {
-            samples.push(node.path, node.sample, self.attributes_of(run, node));
+            samples.push(node.path, node.sample, attributes_of(&run.attributes, node));
         }
         for &(node, place, _, attributes) in &run.surfaces {
             let node = &run.nodes[node as usize];
             samples.push_behind(node.path, place as usize, node.sample, attributes);
         }
     }
+}
 
-    /// What the line pass sees of a node.
-    #[inline]
-    fn attributes_of(&self, run: &Run, node: &TreeNode) -> Node {
-        let attributes = run.attributes.get(node.attributes as usize).copied().unwrap_or_default();
-        let contribution = (node.throughput * node.radiance).to_array();
-        Node { throughput: node.throughput.to_array(), contribution, ..attributes }
-    }
+/// What the line pass sees of a node.
+fn attributes_of(attributes: &[Node], node: &TreeNode) -> Node {
+    let attributes = attributes.get(node.attributes as usize).copied().unwrap_or_default();
+    let contribution = (node.throughput * node.radiance).to_array();
+    Node { throughput: node.throughput.to_array(), contribution, ..attributes }
 }
 
 /// What is known of a tile's rays before they are traced, and whether what they meet is to be known afterwards.

@@ -7,6 +7,7 @@
 mod sobol;
 mod stratified;
 
+use crate::sample::PixelRect;
 use crate::scene::settings::Sampler;
 use sobol::{BlueNoise, Sobol};
 use stratified::Stratified;
@@ -37,15 +38,48 @@ impl SamplePositions {
         Self { kind }
     }
 
+    /// Those of all `samples` of the pixels of a rectangle, in order: what [`PixelPositions::offset`] gives one by one, bit for bit.
+    #[must_use]
+    pub fn of_rect(&self, arch: pulp::Arch, rect: &PixelRect, samples: u32) -> Vec<[f32; 2]> {
+        let mut offsets = vec![[0.0; 2]; rect.pixels() * samples as usize];
+        arch.dispatch(Fill { positions: self, rect, samples: samples as usize, offsets: &mut offsets });
+        offsets
+    }
+
     /// Those of one pixel.
     #[must_use]
-    #[inline]
+    #[inline(always)]
     pub fn of_pixel(&self, pixel: [i32; 2]) -> PixelPositions<'_> {
         PixelPositions(match &self.kind {
             Kind::Stratified(positions) => InPixel::Stratified(positions.of_pixel(pixel)),
             Kind::Sobol(positions) => InPixel::Sobol(positions.of_pixel(pixel)),
             Kind::BlueNoise(positions) => InPixel::Sobol(positions.of_pixel(pixel)),
         })
+    }
+}
+
+/// Fills in the offsets of a rectangle.
+struct Fill<'a> {
+    positions: &'a SamplePositions,
+    rect: &'a PixelRect,
+    samples: usize,
+    offsets: &'a mut [[f32; 2]],
+}
+
+impl pulp::WithSimd for Fill<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: pulp::Simd>(self, _: S) {
+        let Self { positions, rect, samples, offsets } = self;
+        let width = rect.width() as usize;
+        for (index, offsets) in offsets.chunks_exact_mut(samples.max(1)).enumerate() {
+            let pixel = [rect.x0 + (index % width) as i32, rect.y0 + (index / width) as i32];
+            match positions.of_pixel(pixel).0 {
+                InPixel::Stratified(positions) => positions.fill(offsets),
+                InPixel::Sobol(positions) => positions.fill(offsets),
+            }
+        }
     }
 }
 
@@ -85,13 +119,13 @@ pub const fn gap_factor(sampler: Sampler) -> f32 {
 }
 
 /// A 32-bit mix of three numbers, the same on every machine (the finaliser of PCG's RXS-M-XS family, chained).
-#[inline]
+#[inline(always)]
 fn mix(a: u32, b: u32, c: u32) -> u32 {
     step(a ^ step(b ^ step(c)))
 }
 
 /// A 32-bit mix of one number.
-#[inline]
+#[inline(always)]
 fn step(state: u32) -> u32 {
     let state = state.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
     let word = ((state >> ((state >> 28) + 4)) ^ state).wrapping_mul(277_803_737);
@@ -99,9 +133,10 @@ fn step(state: u32) -> u32 {
 }
 
 /// A number in 0 … 1 (1 excluded) from the upper 24 bits.
-#[inline]
+#[inline(always)]
 fn unit(bits: u32) -> f32 {
-    (bits >> 8) as f32 * (1.0 / 16_777_216.0)
+    // Of signed integers there is a conversion in every set of instructions.
+    (bits >> 8) as i32 as f32 * (1.0 / 16_777_216.0)
 }
 
 /// Element `i` of a random permutation of 0 … `length`, by Kensler's hashed cycle walk
@@ -151,6 +186,24 @@ mod tests {
                     let pixel = positions.of_pixel(pixel);
                     assert!((0..samples).all(|sample| pixel.offset(sample).iter().all(|x| (0.0..1.0).contains(x))));
                 }
+            }
+        }
+    }
+
+    #[test]
+    fn rectangles_are_filled_with_the_same() {
+        let rect = PixelRect { x0: -3, y0: 5, x1: 4, y1: 8 };
+        for sampler in SAMPLERS {
+            for samples in [1, 2, 3, 7, 9, 11, 16, 17, 64, 100] {
+                let positions = SamplePositions::new(sampler, samples, 3);
+                let mut filled = positions.of_rect(pulp::Arch::new(), &rect, samples).into_iter();
+                for [x, y] in (rect.y0..rect.y1).flat_map(|y| (rect.x0..rect.x1).map(move |x| [x, y])) {
+                    for sample in 0..samples {
+                        let one = positions.of_pixel([x, y]).offset(sample);
+                        assert_eq!(filled.next().map(|offset| offset.map(f32::to_bits)), Some(one.map(f32::to_bits)));
+                    }
+                }
+                assert_eq!(filled.next(), None);
             }
         }
     }

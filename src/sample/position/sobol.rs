@@ -19,7 +19,7 @@ impl Sobol {
         Self { seed }
     }
 
-    #[inline]
+    #[inline(always)]
     pub(super) fn of_pixel(&self, pixel: [i32; 2]) -> OfPixel {
         OfPixel::new(0, mix(pixel[0] as u32, pixel[1] as u32, self.seed))
     }
@@ -45,6 +45,7 @@ impl BlueNoise {
         Self { seed, samples, digits: (32 - bits) / 2 }
     }
 
+    #[inline(always)]
     pub(super) fn of_pixel(&self, [x, y]: [i32; 2]) -> OfPixel {
         let place = interleaved(x as u32) | interleaved(y as u32) << 1;
         // The next square of as many pixels has a scrambling of its own.
@@ -92,12 +93,20 @@ pub(super) struct OfPixel {
 }
 
 impl OfPixel {
-    #[inline]
+    #[inline(always)]
     fn new(first: u32, key: u32) -> Self {
         Self { first, seeds: [mix(key, 0, 1), mix(key, 0, 2)] }
     }
 
-    #[inline]
+    /// The offsets of all samples.
+    #[inline(always)]
+    pub(super) fn fill(&self, offsets: &mut [[f32; 2]]) {
+        for (sample, offset) in (0..).zip(offsets) {
+            *offset = self.offset(sample);
+        }
+    }
+
+    #[inline(always)]
     pub(super) fn offset(&self, sample: u32) -> [f32; 2] {
         let index = self.first.wrapping_add(sample);
         let [x, y] = [index, second_dimension(index)];
@@ -109,7 +118,7 @@ impl OfPixel {
 ///
 /// Bits are coefficients of a polynomial over GF(2), and this is what it becomes with x + 1 for x. As (x + 1)^16 = x^16 + 1, that
 /// is done by halves.
-#[inline]
+#[inline(always)]
 fn second_dimension(index: u32) -> u32 {
     let mut x = index;
     x ^= x >> 16;
@@ -120,7 +129,7 @@ fn second_dimension(index: u32) -> u32 {
 }
 
 /// Owen's scrambling of digits from the lowest bit upwards: each is flipped or not by a hash of those below it.
-#[inline]
+#[inline(always)]
 fn scramble(digits: u32, seed: u32) -> u32 {
     let mut x = digits;
     x ^= x.wrapping_mul(0x3D20_ADEA);
