@@ -11,7 +11,7 @@ use crate::scene::mesh::Mesh;
 /// Triangles of a block.
 pub(super) const WIDTH: usize = 4;
 /// The id of an absent triangle.
-const NONE: u32 = u32::MAX;
+pub(super) const NO_TRIANGLE: u32 = u32::MAX;
 
 /// Four triangles. Absent ones have vertices that are NaN, so that no ray meets them.
 #[derive(Clone, Copy)]
@@ -29,15 +29,15 @@ impl Block {
         let id = self.ids[place];
         let corner = |[x, y, z]: &[Vec4; 3]| Vec3::new(x[place], y[place], z[place]);
         let [a, b, c] = &self.corners;
-        (id != NONE).then(|| (id, [corner(a), corner(b), corner(c)]))
+        (id != NO_TRIANGLE).then(|| (id, [corner(a), corner(b), corner(c)]))
     }
 
-    /// Shows each triangle that the ray meets within `*t_max` to `accept`. The tests are those of [`Ray::triangle`],
+    /// Shows each triangle that the ray meets within `*t_max`, but the one that it `leaves`, to `accept`. The tests are those of [`Ray::triangle`],
     /// operation by operation, on four triangles at a time; where it does more than that, it is asked itself.
     #[inline(always)]
     fn intersect(
         &self,
-        ray: &Ray,
+        (ray, leaves): (&Ray, u32),
         near: f32,
         t_max: &mut f32,
         accept: &mut impl FnMut(u32, TriangleHit, &mut f32) -> bool,
@@ -75,6 +75,9 @@ impl Block {
         while candidates != 0 {
             let place = candidates.trailing_zeros() as usize % WIDTH;
             candidates &= candidates - 1;
+            if self.ids[place] == leaves {
+                continue;
+            }
             let hit = if special & (1 << place) == 0 {
                 let determinant = determinant[place];
                 let [u, v] = [v[place] / determinant, w[place] / determinant];
@@ -135,7 +138,7 @@ impl MeshTree {
         tree.number_leaves(|places| {
             let first = blocks.len() as u32;
             for places in order[places].chunks(WIDTH) {
-                let mut block = Block { corners: [[Vec4::NAN; 3]; 3], ids: [NONE; WIDTH] };
+                let mut block = Block { corners: [[Vec4::NAN; 3]; 3], ids: [NO_TRIANGLE; WIDTH] };
                 for (lane, place) in places.iter().enumerate() {
                     let id = ids[*place as usize];
                     block.ids[lane] = id;
@@ -180,34 +183,37 @@ impl MeshTree {
     /// Shows each triangle that the ray meets within `*t_max` to `accept`, with its id, roughly front to back.
     /// `accept` may lower `t_max` and returns whether to go on.
     pub fn intersect(&self, ray: &Ray, t_max: &mut f32, accept: impl FnMut(u32, TriangleHit, &mut f32) -> bool) {
-        self.intersect_with(Pairs, ray, t_max, accept);
+        self.intersect_with::<_, true>(Pairs, (ray, NO_TRIANGLE), t_max, accept);
     }
 
-    /// The same with chosen instructions.
+    /// The same with chosen instructions, nearer triangles first or anyhow, but for the triangle that the ray leaves.
     #[inline(always)]
-    pub(super) fn intersect_with<E: Eights>(
+    pub(super) fn intersect_with<E: Eights, const NEAR_FIRST: bool>(
         &self,
         eights: E,
-        ray: &Ray,
+        (ray, leaves): (&Ray, u32),
         t_max: &mut f32,
         accept: impl FnMut(u32, TriangleHit, &mut f32) -> bool,
     ) {
-        self.tree.traverse(eights, ray, t_max, InLeaf { tree: self, ray, accept });
+        self.tree.traverse(eights, ray, t_max, InLeaf::<_, NEAR_FIRST> { tree: self, ray, leaves, accept });
     }
 }
 
 /// Looks at the triangles of leaves.
-struct InLeaf<'a, A> {
+struct InLeaf<'a, A, const NEAR_FIRST: bool> {
     tree: &'a MeshTree,
     ray: &'a Ray,
+    leaves: u32,
     accept: A,
 }
 
-impl<A: FnMut(u32, TriangleHit, &mut f32) -> bool> Visitor for InLeaf<'_, A> {
+impl<A: FnMut(u32, TriangleHit, &mut f32) -> bool, const NEAR_FIRST: bool> Visitor for InLeaf<'_, A, NEAR_FIRST> {
+    const NEAR_FIRST: bool = NEAR_FIRST;
+
     #[inline(always)]
     fn leaf<E: Eights>(&mut self, _: E, leaf: Leaf<'_>, t_max: &mut f32) -> bool {
         for block in self.tree.blocks(&leaf) {
-            if !block.intersect(self.ray, leaf.near, t_max, &mut self.accept) {
+            if !block.intersect((self.ray, self.leaves), leaf.near, t_max, &mut self.accept) {
                 return false;
             }
         }

@@ -12,6 +12,7 @@ use super::eight::{self, Eights};
 use super::mesh_tree::{MeshTree, WIDTH};
 use super::tree::{BOX_FAR_SCALE, BOX_NEAR_SCALE, Leaf, Slabs, Visitor, max, min};
 use super::triangle::{MOST_SLACK, NOT_AHEAD, Ray, normal_and_size};
+use super::world::PlacedObject;
 use crate::math::{Mat3, Vec3};
 use crate::scene::camera::CameraRays;
 
@@ -140,14 +141,18 @@ impl LaneRays {
         Self { origin, direction, inverse }
     }
 
-    /// The rays in the space of an object, as [`super::world::PlacedObject`] places single rays there.
+    /// The rays in the space of an object, as [`PlacedObject::to_object`] places single rays there.
     #[inline(always)]
-    pub fn placed(&self, object_from_world: &Mat3, translation: Vec3) -> Self {
-        let mut from = self.origin;
-        for (lanes, translation) in from.iter_mut().zip(translation.to_array()) {
+    pub fn placed(&self, object: &PlacedObject) -> Self {
+        let mut origin = self.origin;
+        for (lanes, translation) in origin.iter_mut().zip(object.translation.to_array()) {
             lanes.iter_mut().for_each(|lane| *lane -= translation);
         }
-        Self::new(product(object_from_world, &from), product(object_from_world, &self.direction))
+        if object.is_only_moved {
+            return Self { origin, ..*self };
+        }
+        let matrix = &object.object_from_world;
+        Self::new(product(matrix, &origin), product(matrix, &self.direction))
     }
 
     /// The largest component of any ray's origin.

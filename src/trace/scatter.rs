@@ -353,21 +353,21 @@ impl TileTracer<'_> {
             // What glass shows is bent: on another page it would not be what lies behind.
             node.alpha = 1.0;
         }
-        let node = *node;
-        if u32::from(node.reflections) < self.plan.reflection_depth {
+        let alpha_weight = 1.0 - node.alpha;
+        let [reflections, refractions] = [node.reflections, node.refractions].map(u32::from);
+        if reflections < self.plan.reflection_depth {
             let weight = bounces.reflection * opacity;
             let kind = PathKind::Reflection;
             let media = hit.ray.media;
             let mirrored = Departure { kind, direction: mirrored, weight, alpha_weight: 0.0, eta: 1.0, media };
-            self.send(hit, &node, mirrored, run);
+            self.send(hit, mirrored, run);
         }
-        if u32::from(node.refractions) < self.plan.refraction_depth {
+        if refractions < self.plan.refraction_depth {
             let direction = if straight { direction } else { bounces.refracted };
-            let alpha_weight = 1.0 - node.alpha;
             let weight = refraction + through;
             let eta = if straight { 1.0 } else { eta };
             let kind = PathKind::Refraction;
-            self.send(hit, &node, Departure { kind, direction, weight, alpha_weight, eta, media }, run);
+            self.send(hit, Departure { kind, direction, weight, alpha_weight, eta, media }, run);
         }
     }
 
@@ -482,12 +482,14 @@ impl TileTracer<'_> {
     }
 
     /// Sends a ray on from a hit, unless it could not be seen.
-    fn send(&self, hit: &WaveHit, parent: &TreeNode, departure: Departure, run: &mut Run) {
+    fn send(&self, hit: &WaveHit, departure: Departure, run: &mut Run) {
         let Departure { kind, direction, weight, alpha_weight, eta, media } = departure;
+        let parent = &run.nodes[hit.ray.node as usize];
         let throughput = parent.throughput * weight;
         if !throughput.is_finite() || throughput.max_element() < LEAST_THROUGHPUT {
             return;
         }
+        let parent = *parent;
         let reflected = kind == PathKind::Reflection;
         let origin = hit.surface.leave(direction);
         let node = run.nodes.len() as u32;
@@ -502,7 +504,7 @@ impl TileTracer<'_> {
             refractions: parent.refractions + u8::from(!reflected),
             length_before: hit.depth,
             throughput,
-            ..TreeNode::root(parent.sample, self.departing_cone(hit, parent, reflected, eta))
+            ..TreeNode::root(parent.sample, self.departing_cone(hit, &parent, reflected, eta))
         });
     }
 

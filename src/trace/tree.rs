@@ -96,6 +96,9 @@ pub trait Slabs<E: Eights> {
 /// Looks into leaves. A closure does; packets have types of their own, because what runs under wider instructions has to be
 /// inlined, which no closure can be made to be.
 pub trait Visitor {
+    /// Whether nearer leaves should come first. Whoever looks for anything at all is quicker without.
+    const NEAR_FIRST: bool = true;
+
     /// Looks into a leaf that is entered within `t_max`, which it may lower; returns whether to go on.
     fn leaf<E: Eights>(&mut self, eights: E, leaf: Leaf<'_>, t_max: &mut f32) -> bool;
 }
@@ -218,7 +221,7 @@ impl BoxTree {
     /// Visits the leaves that a ray enters within `*t_max`, roughly front to back. `visit` may lower `t_max` and returns
     /// whether to go on.
     #[inline(always)]
-    pub fn traverse<E: Eights>(&self, eights: E, ray: &Ray, t_max: &mut f32, visit: impl Visitor) {
+    pub fn traverse<E: Eights, V: Visitor>(&self, eights: E, ray: &Ray, t_max: &mut f32, visit: V) {
         if ray.is_sound() {
             self.walk(eights, &RaySlabs::new(eights, ray), t_max, visit);
         }
@@ -226,7 +229,7 @@ impl BoxTree {
 
     /// The same for anything that has slab distances, none of which may be NaN.
     #[inline(always)]
-    pub fn walk<E: Eights>(&self, e: E, slabs: &impl Slabs<E>, t_max: &mut f32, mut visit: impl Visitor) {
+    pub fn walk<E: Eights, V: Visitor>(&self, e: E, slabs: &impl Slabs<E>, t_max: &mut f32, mut visit: V) {
         if self.nodes.is_empty() {
             return;
         }
@@ -249,7 +252,12 @@ impl BoxTree {
             if left != 0 {
                 let mut nearest = key(left);
                 left &= left - 1;
-                if left != 0 {
+                if !V::NEAR_FIRST {
+                    while left != 0 {
+                        stack.push(key(left));
+                        left &= left - 1;
+                    }
+                } else if left != 0 {
                     let mut second = key(left);
                     left &= left - 1;
                     if second < nearest {

@@ -20,6 +20,10 @@ pub(super) const MOST_SLACK: f32 = 1.0 / 16.0;
 /// A vertex that is not farther ahead of a ray than this, times the farthest of its triangle, may be behind it.
 pub(super) const NOT_AHEAD: f32 = gamma(8);
 
+/// Axes of the sheared space, by the axis of the largest component of the direction and whether it is negative: the winding of the
+/// sheared triangle stays what it is.
+const AXES: [[[usize; 3]; 2]; 3] = [[[1, 2, 0], [2, 1, 0]], [[2, 0, 1], [0, 2, 1]], [[0, 1, 2], [1, 0, 2]]];
+
 /// A ray, with what the triangle test needs of it worked out.
 #[derive(Clone, Copy, Debug)]
 pub struct Ray {
@@ -58,27 +62,20 @@ impl Ray {
     #[inline]
     #[must_use]
     pub fn new(origin: Vec3, direction: Vec3) -> Self {
+        // Without branches: which way a ray goes is anybody's guess.
         let magnitude = direction.abs();
-        let z = if magnitude.x > magnitude.y && magnitude.x > magnitude.z {
-            0
-        } else if magnitude.y > magnitude.z {
-            1
-        } else {
-            2
-        };
-        let (mut x, mut y) = ((z + 1) % 3, (z + 2) % 3);
-        // Keeps the winding of the sheared triangle.
-        if direction[z] < 0.0 {
-            std::mem::swap(&mut x, &mut y);
-        }
+        let is_x = (magnitude.x > magnitude.y) & (magnitude.x > magnitude.z);
+        let largest = if is_x { 0 } else { 2 - usize::from(magnitude.y > magnitude.z) };
+        let components = [direction.x, direction.y, direction.z, 1.0];
+        let axes = AXES[largest][usize::from(components[largest] < 0.0)];
         // Divisions in pairs: three take as long as one.
-        let along = direction[z];
-        let shear = (Vec4::new(direction[x], direction[y], 1.0, 1.0) / Vec4::splat(along)).truncate();
+        let [x, y, along] = axes.map(|axis| components[axis & 3]);
+        let shear = (Vec4::new(x, y, 1.0, 1.0) / Vec4::splat(along)).truncate();
         // A component of exactly 0 would make 0 · ∞ = NaN at a box face that contains the origin. At 1e-30 the ray
         // strays less than a unit in the last place over any distance a float can hold beside its origin.
         let safe = |d: f32| if d.abs() < 1e-30 { 1e-30_f32.copysign(d) } else { d };
         let inverse = (Vec4::ONE / Vec4::new(safe(direction.x), safe(direction.y), safe(direction.z), 1.0)).truncate();
-        Self { origin, direction, inverse, grain: Vec3::ZERO, axes: [x, y, z], shear }
+        Self { origin, direction, inverse, grain: Vec3::ZERO, axes, shear }
     }
 
     /// Whether it can meet anything.

@@ -6,7 +6,7 @@ use obvhs::aabb::Aabb;
 use rayon::prelude::*;
 
 use super::eight::{Eights, Task, dispatch};
-use super::mesh_tree::MeshTree;
+use super::mesh_tree::{MeshTree, NO_TRIANGLE};
 use super::tree::{BoxTree, Leaf, Visitor};
 use super::triangle::Ray;
 use crate::math::{DVec3, Mat3, Vec3, Vec3A};
@@ -56,6 +56,8 @@ pub struct PlacedObject {
     /// Where the object's origin lies, relative to the camera.
     pub translation: Vec3,
     pub(super) object_from_world: Mat3,
+    /// Whether the object is neither turned nor scaled: most models come that way, and rays go on there as they are.
+    pub(super) is_only_moved: bool,
     /// Inverse transpose of the linear part, for normals.
     pub normal_from_object: Mat3,
     pub(super) visible_to: RayKinds,
@@ -76,8 +78,11 @@ impl PlacedObject {
 
     #[inline(always)]
     pub(super) fn to_object(&self, ray: &Ray) -> Ray {
-        let origin = self.object_from_world * (ray.origin - self.translation);
-        Ray { grain: self.grain(ray.origin), ..Ray::new(origin, self.object_from_world * ray.direction) }
+        let (grain, origin) = (self.grain(ray.origin), ray.origin - self.translation);
+        if self.is_only_moved {
+            return Ray { origin, grain, ..*ray };
+        }
+        Ray { grain, ..Ray::new(self.object_from_world * origin, self.object_from_world * ray.direction) }
     }
 
     /// The grain, in the object's space, of a ray that starts at `origin`.
@@ -85,6 +90,9 @@ impl PlacedObject {
     pub(super) fn grain(&self, origin: Vec3) -> Vec3 {
         let m = self.object_from_world;
         let rounded = origin.abs() + self.translation.abs();
+        if self.is_only_moved {
+            return rounded;
+        }
         m.x_axis.abs() * rounded.x + m.y_axis.abs() * rounded.y + m.z_axis.abs() * rounded.z
     }
 }
@@ -137,6 +145,7 @@ impl World {
                     world_from_object: linear.as_mat3(),
                     translation: (object.world_from_object.translation - origin).as_vec3(),
                     object_from_world: inverse.as_mat3(),
+                    is_only_moved: inverse.as_mat3() == Mat3::IDENTITY,
                     normal_from_object: inverse.transpose().as_mat3(),
                     visible_to: object.visible_to,
                     priorities: object
@@ -202,16 +211,14 @@ impl World {
     ) -> bool {
         passed.clear();
         let mut blocked = false;
-        self.each_hit(ray, RayKinds::SHADOW, t_max, |hit, _, _| {
-            if leaves == Some(hit.facet()) {
-                return true;
-            }
+        let accept = |hit: Hit, _: f32, _: &mut f32| {
             blocked = opaque(self.material(&hit));
             if !blocked {
                 passed.push(hit);
             }
             !blocked
-        });
+        };
+        dispatch(self.arch, Hits::<_, false> { world: self, ray, kind: RayKinds::SHADOW, t_max, leaves, accept });
         if !blocked {
             passed.sort_by(|a, b| a.t.total_cmp(&b.t).then((a.object, a.triangle).cmp(&(b.object, b.triangle))));
         }
@@ -228,20 +235,21 @@ impl World {
         t_max: f32,
         accept: impl FnMut(Hit, f32, &mut f32) -> bool,
     ) {
-        dispatch(self.arch, Hits { world: self, ray, kind, t_max, accept });
+        dispatch(self.arch, Hits::<_, true> { world: self, ray, kind, t_max, leaves: None, accept });
     }
 }
 
-/// Shows hits of a ray.
-struct Hits<'a, A> {
+/// Shows hits of a ray, nearer ones first or anyhow, but none with the triangle that it `leaves`.
+struct Hits<'a, A, const NEAR_FIRST: bool> {
     world: &'a World,
     ray: &'a Ray,
     kind: RayKinds,
     t_max: f32,
+    leaves: Option<Facet>,
     accept: A,
 }
 
-impl<A: FnMut(Hit, f32, &mut f32) -> bool> Task for Hits<'_, A> {
+impl<A: FnMut(Hit, f32, &mut f32) -> bool, const NEAR_FIRST: bool> Task for Hits<'_, A, NEAR_FIRST> {
     type Output = ();
 
     #[inline(always)]
@@ -251,10 +259,12 @@ impl<A: FnMut(Hit, f32, &mut f32) -> bool> Task for Hits<'_, A> {
     }
 }
 
-impl<A: FnMut(Hit, f32, &mut f32) -> bool> Visitor for Hits<'_, A> {
+impl<A: FnMut(Hit, f32, &mut f32) -> bool, const NEAR_FIRST: bool> Visitor for Hits<'_, A, NEAR_FIRST> {
+    const NEAR_FIRST: bool = NEAR_FIRST;
+
     #[inline(always)]
     fn leaf<E: Eights>(&mut self, eights: E, leaf: Leaf<'_>, t_max: &mut f32) -> bool {
-        let Self { world, ray, kind, accept, .. } = self;
+        let Self { world, ray, kind, leaves, accept, .. } = self;
         let culls = *kind != RayKinds::SHADOW;
         for id in &world.tree.order[leaf.range()] {
             let object = &world.objects[*id as usize];
@@ -262,7 +272,9 @@ impl<A: FnMut(Hit, f32, &mut f32) -> bool> Visitor for Hits<'_, A> {
                 continue;
             }
             let mut go_on = true;
-            object.tree.intersect_with(eights, &object.to_object(ray), t_max, |triangle, hit, t_max| {
+            let left = leaves.filter(|(object, _)| object.0 == *id).map_or(NO_TRIANGLE, |(_, triangle)| triangle);
+            let placed = object.to_object(ray);
+            object.tree.intersect_with::<_, NEAR_FIRST>(eights, (&placed, left), t_max, |triangle, hit, t_max| {
                 if culls && !hit.front && object.single_sided[object.slot(triangle)] {
                     return true;
                 }

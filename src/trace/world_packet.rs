@@ -210,7 +210,7 @@ impl<S: Search> Visitor for Objects<'_, S> {
                 let object = &world.objects[*id as usize];
                 if object.visible_to.contains(*kind) {
                     let (_, limit, _) = rays.enter(&leaf, search.reach());
-                    let placed = rays.placed(&object.object_from_world, object.translation);
+                    let placed = rays.placed(object);
                     search.object(eights, *id, object, &placed, &near, limit);
                 }
             }
