@@ -231,7 +231,7 @@ mod tests {
             { shape = "box", size = [1.5, 1.5, 1.5], rotate = [20, 30, 40] },
             { shape = "torus", translate = [3, 0, 0], scale = [-1.0, 1.0, 2.0] },
             { shape = "box", size = [2.0, 1e-9, 2.0], translate = [0, -2, 0], rotate = [50, 0, 0] },
-            { shape = "sphere", radius = 1e-20, translate = [0, 2, 0], scale = 1e20 },
+            { shape = "sphere", radius = 1e-8, translate = [0, 2, 0], scale = 1e8 },
             { shape = "sphere", radius = 0.3, translate = [3, 2, 0] },
             { shape = "sphere", radius = 0.3, translate = [3.4, 2, 0] },
         ]
