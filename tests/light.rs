@@ -297,7 +297,7 @@ fn a_mirror_shows_what_is_there_and_how_far_it_is() {
     assert_eq!((buffer.paths.len(), reflected.path), (2, NodePath::CAMERA.reflected()));
     assert_eq!((reflected.object.get(0), reflected.shader.get(0)), (2, 2));
     close(f64::from(reflected.depth.get(0)), 8.0, 2e-3);
-    close(f64::from(buffer.color[0][0]), mirror_weight()[0] * 3.0, 1e-5);
+    close(f64::from(buffer.color.get(0)[0]), mirror_weight()[0] * 3.0, 1e-5);
     for (channel, weight) in reflected.throughput.get(0).into_iter().enumerate() {
         close(f64::from(weight), mirror_weight()[channel], 1e-5);
     }

@@ -320,13 +320,14 @@ impl Field {
         let buffer = pixel.buffer;
         match self {
             Self::Plain | Self::Lined | Self::Below => {
-                let (first, rest) = buffer.color[samples.clone()].split_first()?;
+                let color = buffer.color.get(pixel.first);
                 let alpha = buffer.alpha.get(pixel.first);
                 let is_one = (self == Self::Plain || pixel.lines.is_empty())
-                    && rest.iter().all(|color| color == first)
+                    && (matches!(buffer.color, Column::Constant(_))
+                        || samples.clone().all(|sample| buffer.color.get(sample) == color))
                     && (matches!(buffer.alpha, Column::Constant(_))
                         || samples.into_iter().all(|sample| buffer.alpha.get(sample) == alpha));
-                is_one.then(|| Vec3::from(*first).extend(alpha))
+                is_one.then(|| Vec3::from(color).extend(alpha))
             }
             Self::Lines(lines) => (!pixel.lines.iter().any(|line| lines.contains(line))).then_some(Vec4::ZERO),
             Self::Aov(index) => {
@@ -342,7 +343,7 @@ impl Field {
     fn gather(self, pixel: &SourcePixel<'_>, values: &mut Vec<Vec4>) -> Gathered {
         let samples = pixel.first..pixel.end;
         let buffer = pixel.buffer;
-        let plain = |sample: usize| Vec3::from(buffer.color[sample]).extend(buffer.alpha.get(sample));
+        let plain = |sample: usize| Vec3::from(buffer.color.get(sample)).extend(buffer.alpha.get(sample));
         let lined = || pixel.lined.iter().map(|&sample| sample as usize - pixel.first).zip(pixel.lines);
         match self {
             Self::Plain | Self::Lined | Self::Below => {

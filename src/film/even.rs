@@ -29,6 +29,10 @@ impl EvenGround {
     /// `values` are those of the pixels that reach `rect`, row by row.
     pub(super) fn new(rect: PixelRect, reach: i32, values: Vec<Option<Vec4>>) -> Self {
         let sources = rect.grown(reach);
+        if values.iter().all(|value| value.is_some() && *value == values[0]) {
+            let [mixed, left, above, uneven] = [(); 4].map(|()| Counts::default());
+            return Self { sources, reach, mixed, left, above, uneven, values };
+        }
         let of = |x: i32, y: i32| place(sources, [x, y]).and_then(|place| values[place]);
         let mixed = Counts::new(sources, |x, y| of(x, y).is_none());
         let left = Counts::new(sources, |x, y| of(x, y) != of(x - 1, y));

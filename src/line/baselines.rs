@@ -163,7 +163,7 @@ fn plain_line(rules: &Rules, fired: Fired, neighbor: ([i32; 2], u32)) -> SeenLin
 
 fn blended(targets: &PathTile<'_>, row: usize, line: SeenLine, alpha: f32) -> (u32, SeenLine) {
     let sample = targets.nodes.rows.sample(row);
-    let before = Vec3::from(targets.buffer.color[sample as usize]);
+    let before = Vec3::from(targets.buffer.color.get(sample as usize));
     let lined = before * (1.0 - alpha) + Vec3::from(line.color) * alpha;
     (sample, SeenLine { alpha, lined: lined.to_array(), ..line })
 }

@@ -371,10 +371,13 @@ impl PathBounds {
             behind: Vec::new(),
         };
         let rect = buffer.rect;
+        // Of misses, all pixels have the same bounds.
+        let all_miss = matches!(nodes.object, Column::Constant(0)) && !nodes.rows.is_empty();
+        let of_misses = all_miss.then(|| of_rows(&all.radius_squared, nodes, 0, 1, rules));
         for y0 in (rect.y0..rect.y1).step_by(BLOCK as usize) {
             for x0 in (rect.x0..rect.x1).step_by(BLOCK as usize) {
                 let block = PixelRect { x0, y0, x1: x0 + BLOCK, y1: y0 + BLOCK }.intersection(&rect);
-                all.add_block(block, buffer, nodes, rules);
+                all.add_block(block, buffer, (nodes, of_misses.as_ref()), rules);
             }
         }
         let layers = nodes.behind.iter().take(rules.surfaces().saturating_sub(1));
@@ -382,7 +385,13 @@ impl PathBounds {
         all
     }
 
-    fn add_block(&mut self, rect: PixelRect, buffer: &SampleBuffer, nodes: &NodeColumns, rules: &Rules) {
+    fn add_block(
+        &mut self,
+        rect: PixelRect,
+        buffer: &SampleBuffer,
+        (nodes, of_misses): (&NodeColumns, Option<&Bounds>),
+        rules: &Rules,
+    ) {
         let tests = rules.tests();
         let first = self.pixels.len();
         for y in rect.y0..rect.y1 {
@@ -397,7 +406,10 @@ impl PathBounds {
                     pixel,
                     first,
                     end: last,
-                    bounds: of_rows(&self.radius_squared, nodes, start, end, rules),
+                    bounds: match of_misses {
+                        Some(bounds) => bounds.clone(),
+                        None => of_rows(&self.radius_squared, nodes, start, end, rules),
+                    },
                 });
                 if tests.reads_shapes {
                     self.shapes.push(shape_of_rows(nodes, start, end, tests));
@@ -412,7 +424,8 @@ impl PathBounds {
         if pixels.is_empty() {
             return;
         }
-        let bounds = pixels.iter().fold(Bounds::EMPTY, |all, pixel| all.union(&pixel.bounds, nodes, rules));
+        let of_all = || pixels.iter().fold(Bounds::EMPTY, |all, pixel| all.union(&pixel.bounds, nodes, rules));
+        let bounds = of_misses.cloned().unwrap_or_else(of_all);
         let shape = self.shapes.get(first..).unwrap_or_default().iter().fold(Shape::EMPTY, |all, one| all.union(one));
         let facets = FacetBounds::of_all(self.facets.get(first..).unwrap_or_default());
         let start = self.by_rank.len();

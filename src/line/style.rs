@@ -218,7 +218,7 @@ impl Styler<'_, '_> {
         let throughput = Vec3::from(targets.nodes.throughput.get(found.row));
         let mut contribution = Vec3::from(targets.nodes.contribution.get(found.row));
         let settings = self.rules.settings();
-        let mut lined = Vec3::from(targets.buffer.color[sample as usize]);
+        let mut lined = Vec3::from(targets.buffer.color.get(sample as usize));
         let (mut color, mut premultiplied, mut covered) = (Vec3::ZERO, Vec3::ZERO, 0.0);
         for Drawn { color: line_color, alpha, .. } in drawn.iter().rev().copied() {
             color = if settings.tint { line_color * throughput } else { line_color };

@@ -387,7 +387,7 @@ pub struct SampleBuffer {
     /// Offsets inside the pixel, 0 … 1.
     pub offset: Vec<[f32; 2]>,
     /// Colours without lines.
-    pub color: Vec<[f32; 3]>,
+    pub color: Column<[f32; 3]>,
     /// 1, or 0 where the camera sees a transparent background.
     pub alpha: Column<f32>,
     /// World positions at the camera's nodes, if the plan names them.
@@ -493,7 +493,7 @@ impl SampleBuffer {
     #[must_use]
     pub fn bytes(&self) -> usize {
         self.offset.len() * size_of::<[f32; 2]>()
-            + self.color.len() * size_of::<[f32; 3]>()
+            + self.color.bytes()
             + self.alpha.bytes()
             + self.position.bytes()
             + self.aovs.iter().map(Column::bytes).sum::<usize>()

@@ -44,8 +44,10 @@ pub struct SampleBufferBuilder {
     layout: SampleLayout,
     rect: PixelRect,
     offset: Vec<[f32; 2]>,
+    /// Empty as long as all samples have the colour `ground`.
     color: Vec<[f32; 3]>,
     alpha: Vec<f32>,
+    ground: SampleColor,
     position: Column<[f32; 3]>,
     aovs: Vec<Column<[f32; 3]>>,
     paths: Vec<PathRows>,
@@ -70,13 +72,14 @@ impl SampleBufferBuilder {
     pub fn with_places(rect: PixelRect, layout: &SampleLayout, mut offset: Vec<[f32; 2]>) -> Self {
         let samples = rect.pixels() * layout.samples_per_pixel as usize;
         offset.resize(samples, [0.0; 2]);
-        offset.iter_mut().for_each(|offset| *offset = clean_offset(*offset));
+        debug_assert!(offset.iter().flatten().all(|x| (0.0..=1.0).contains(x)), "a sample lies outside its pixel");
         let kept = |keep: bool| if keep { Column::Values(vec![[0.0; 3]; samples]) } else { Column::Constant([0.0; 3]) };
         Self {
             rect,
             offset,
-            color: vec![[0.0; 3]; samples],
-            alpha: vec![0.0; samples],
+            color: Vec::new(),
+            alpha: Vec::new(),
+            ground: SampleColor::default(),
             position: kept(layout.position),
             aovs: vec![kept(true); layout.aovs],
             paths: vec![PathRows::new(NodePath::CAMERA, samples)],
@@ -109,8 +112,18 @@ impl SampleBufferBuilder {
     pub fn set_color(&mut self, sample: u32, color: SampleColor, shader: u32) {
         let (SampleColor { color, alpha }, faults) = clean_color(color);
         self.gate.note(NodePath::CAMERA, sample, shader, faults);
+        if self.color.is_empty() {
+            self.break_ground();
+        }
         self.color[sample as usize] = color;
         self.alpha[sample as usize] = alpha;
+    }
+
+    /// From now on each sample has a colour of its own.
+    #[cold]
+    fn break_ground(&mut self) {
+        self.color = vec![self.ground.color; self.offset.len()];
+        self.alpha = vec![self.ground.alpha; self.offset.len()];
     }
 
     /// Sets one colour of a row of samples; no shader made it.
@@ -118,10 +131,17 @@ impl SampleBufferBuilder {
     /// # Panics
     /// If the rectangle has not all of them.
     pub fn set_same_color(&mut self, samples: Range<u32>, color: SampleColor) {
-        let (SampleColor { color, alpha }, faults) = clean_color(color);
+        let (color, faults) = clean_color(color);
         let places = samples.start as usize..samples.end as usize;
-        self.color[places.clone()].fill(color);
-        self.alpha[places].fill(alpha);
+        if self.color.is_empty() && places == (0..self.offset.len()) {
+            self.ground = color;
+        } else {
+            if self.color.is_empty() {
+                self.break_ground();
+            }
+            self.color[places.clone()].fill(color.color);
+            self.alpha[places].fill(color.alpha);
+        }
         if !faults.is_empty() {
             samples.for_each(|sample| self.gate.note(NodePath::CAMERA, sample, 0, faults));
         }
@@ -263,8 +283,8 @@ impl SampleBufferBuilder {
             rect: self.rect,
             samples_per_pixel: self.layout.samples_per_pixel,
             offset: self.offset,
-            color: self.color,
-            alpha: Column::Values(self.alpha).collapsed(),
+            color: column(self.color, self.ground.color),
+            alpha: column(self.alpha, self.ground.alpha),
             position: self.position.collapsed(),
             aovs: self.aovs.into_iter().map(Column::collapsed).collect(),
             paths,
@@ -637,6 +657,11 @@ impl<T: Copy + PartialEq> Column<T> {
             Self::Palette { .. } | Self::Constant(_) => self,
         }
     }
+}
+
+/// Values of samples, or the one of all if there are none.
+fn column<T: Copy + PartialEq>(values: Vec<T>, ground: T) -> Column<T> {
+    if values.is_empty() { Column::Constant(ground) } else { Column::Values(values).collapsed() }
 }
 
 /// A sample as data, for tests and for line work on pictures from elsewhere.

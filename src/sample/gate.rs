@@ -120,7 +120,6 @@ impl Faults {
 }
 
 /// A place in a pixel as the buffer may hold it: the bounds of the line search rely on 0 … 1.
-#[inline]
 pub(super) fn clean_offset(offset: [f32; 2]) -> [f32; 2] {
     offset.map(|x| if x.abs() <= LARGEST { (x + 0.0).clamp(0.0, 1.0) } else { 0.0 })
 }

@@ -277,8 +277,9 @@ fn halved(buffer: &SampleBuffer, kept: Kept) -> (SampleBuffer, usize) {
     let is = |what: Kept| kept == what || kept == Kept::All;
     let mut spared = 0;
     if is(Kept::Color) {
-        buffer.color.iter_mut().for_each(|color| *color = color.map(rounded));
-        spared += buffer.color.len() * 6;
+        let (column, bytes) = in_halves(&buffer.color);
+        buffer.color = column;
+        spared += bytes;
     }
     for nodes in &mut buffer.paths {
         if is(Kept::Depth) {

@@ -106,7 +106,7 @@ impl Samples {
             rect,
             samples_per_pixel: self.samples_per_pixel,
             offset: at.iter().map(|&(x, y, s)| (self.offset)(x, y, s)).collect(),
-            color: at.iter().map(|&(x, y, s)| (self.color)(x, y, s).color).collect(),
+            color: Column::Values(at.iter().map(|&(x, y, s)| (self.color)(x, y, s).color).collect()),
             alpha: values(&at, |x, y, s| (self.color)(x, y, s).alpha),
             position: triple(60),
             aovs: vec![Column::Constant([0.25, 0.5, 4.0]), triple(70)],

@@ -115,8 +115,8 @@ fn colors_and_extra_outputs_count_with_the_node_that_made_them() {
     builder.set_extras(1, [1.0; 3], &[[f32::INFINITY; 3]]);
     let buffer = builder.finish();
     assert_eq!(buffer.offset[0], [0.0, 1.0]);
-    assert_eq!((buffer.color[0], buffer.alpha.get(0)), ([0.0, 0.5, 0.5], 1.0));
-    assert_eq!((buffer.color[2], buffer.alpha.get(2)), ([0.0; 3], 0.0));
+    assert_eq!((buffer.color.get(0), buffer.alpha.get(0)), ([0.0, 0.5, 0.5], 1.0));
+    assert_eq!((buffer.color.get(2), buffer.alpha.get(2)), ([0.0; 3], 0.0));
     assert_eq!(values(&buffer.position, 3), [[0.0, 1.0, 2.0], [1.0; 3], [0.0; 3]]);
     assert_eq!(values(&buffer.aovs[0], 3), [[0.0, 1.0, 2.0], [0.0; 3], [0.0; 3]]);
     assert_eq!(buffer.gate[4], GateCounts { nan: 1, infinite: 1, ..Default::default() });
