@@ -105,6 +105,14 @@ impl RayPacket {
         self.count
     }
 
+    /// Origins and directions. Asked for at once: numbers that are written one by one and read together right away make the
+    /// processor wait.
+    #[inline]
+    #[must_use]
+    pub fn ray_starts(&self) -> [RayStart; LANES] {
+        std::array::from_fn(|lane| self.ray_start(lane))
+    }
+
     /// Origin and direction of one of the rays.
     #[inline]
     #[must_use]

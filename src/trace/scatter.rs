@@ -345,6 +345,10 @@ impl TileTracer<'_> {
             }
         }
 
+        if opacity == 1.0 && !plan.reflects && !plan.refracts {
+            // Nothing is sent on.
+            return;
+        }
         let refraction = bounces.refraction * opacity;
         let through = Vec3::splat(1.0 - opacity);
         // One ray stands for both ways through a surface that is see-through and refracts.

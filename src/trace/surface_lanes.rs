@@ -13,55 +13,17 @@ use crate::math::{Mat3, Vec3};
 /// Vectors by axis.
 type Axes = [Lanes; 3];
 
-/// The surfaces at the hits of a packet.
-pub(super) struct SurfaceLanes {
-    position: Axes,
-    error: Axes,
-    geometric_normal: Axes,
-    normal: Axes,
-    barycentric: Axes,
-    /// Whether the lane holds its surface.
-    sound: [bool; LANES],
-}
-
-impl SurfaceLanes {
-    /// Those of the hits of rays, as far as they can be worked out together.
-    #[inline]
-    pub fn new(world: &World, hits: &PacketHits) -> Self {
-        let zeros = [[0.0; LANES]; 3];
-        let mut lanes = Self {
-            position: zeros,
-            error: zeros,
-            geometric_normal: zeros,
-            normal: zeros,
-            barycentric: zeros,
-            sound: [false; LANES],
-        };
-        let mut met = hits.iter().flatten();
-        if let Some(first) = met.next()
-            && met.all(|hit| hit.object == first.object)
-        {
-            world.arch.dispatch(Fill { object: world.object(first.object), first, hits, lanes: &mut lanes });
-        }
-        lanes
+/// The surfaces at the hits of a packet, as far as they can be worked out together; not where a ray met nothing.
+#[inline]
+pub(super) fn surfaces_of(world: &World, hits: &PacketHits) -> [Option<Surface>; LANES] {
+    let mut surfaces = [None; LANES];
+    let mut met = hits.iter().flatten();
+    if let Some(first) = met.next()
+        && met.all(|hit| hit.object == first.object)
+    {
+        world.arch.dispatch(Fill { object: world.object(first.object), first, hits, surfaces: &mut surfaces });
     }
-
-    /// The surface at the hit of a lane, whose ray goes in `direction`.
-    #[inline]
-    pub fn surface(&self, lane: usize, world: &World, direction: Vec3, hit: &Hit) -> Surface {
-        if !self.sound[lane] {
-            return Surface::new(world, direction, hit);
-        }
-        let of = |axes: &Axes| Vec3::new(axes[0][lane], axes[1][lane], axes[2][lane]);
-        Surface {
-            position: of(&self.position),
-            error: of(&self.error),
-            geometric_normal: of(&self.geometric_normal),
-            normal: of(&self.normal),
-            barycentric: of(&self.barycentric),
-            front: hit.front,
-        }
-    }
+    surfaces
 }
 
 struct Fill<'a> {
@@ -69,7 +31,7 @@ struct Fill<'a> {
     /// Stands in for rays that met nothing.
     first: &'a Hit,
     hits: &'a PacketHits,
-    lanes: &'a mut SurfaceLanes,
+    surfaces: &'a mut [Option<Surface>; LANES],
 }
 
 impl pulp::WithSimd for Fill<'_> {
@@ -77,15 +39,15 @@ impl pulp::WithSimd for Fill<'_> {
 
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
-        let Self { object, first, hits, lanes } = self;
+        let Self { object, first, hits, surfaces } = self;
         let mesh = &object.mesh;
         let zeros = [[0.0; LANES]; 3];
-        let (mut corners, mut normals, mut flip) = ([zeros; 3], [zeros; 3], [0.0; LANES]);
+        let (mut corners, mut normals, mut weights, mut flip) = ([zeros; 3], [zeros; 3], zeros, [0.0; LANES]);
         let has_normals = !mesh.normals.is_empty();
         for (lane, hit) in hits.iter().enumerate() {
             let hit = hit.as_ref().unwrap_or(first);
             let [u, v] = hit.barycentric;
-            set(&mut lanes.barycentric, lane, Vec3::new(1.0 - u - v, u, v));
+            set(&mut weights, lane, Vec3::new(1.0 - u - v, u, v));
             flip[lane] = if hit.front { 1.0 } else { -1.0 };
             for (corner, vertex) in mesh.triangles[hit.triangle as usize].iter().enumerate() {
                 set(&mut corners[corner], lane, mesh.positions[*vertex as usize]);
@@ -94,16 +56,25 @@ impl pulp::WithSimd for Fill<'_> {
                 }
             }
         }
-        let weights = &lanes.barycentric;
-        place(object, &corners, weights, &mut lanes.position, &mut lanes.error);
-        let mut sound = geometric_normals(&object.normal_from_object, &corners, &flip, &mut lanes.geometric_normal);
+        let (mut position, mut error, mut geometric, mut normal) = (zeros, zeros, zeros, zeros);
+        place(object, &corners, &weights, &mut position, &mut error);
+        let mut sound = geometric_normals(&object.normal_from_object, &corners, &flip, &mut geometric);
         if has_normals {
-            let turned = (&normals, weights, &flip);
-            shading_normals(&object.normal_from_object, turned, &lanes.geometric_normal, &mut lanes.normal, &mut sound);
+            let turned = (&normals, &weights, &flip);
+            shading_normals(&object.normal_from_object, turned, &geometric, &mut normal, &mut sound);
         } else {
-            lanes.normal = lanes.geometric_normal;
+            normal = geometric;
         }
-        lanes.sound = sound;
+        for (lane, (surface, hit)) in surfaces.iter_mut().zip(hits).enumerate() {
+            *surface = hit.filter(|_| sound[lane]).map(|hit| Surface {
+                position: of(&position, lane).into(),
+                error: of(&error, lane).into(),
+                geometric_normal: of(&geometric, lane).into(),
+                normal: of(&normal, lane).into(),
+                barycentric: of(&weights, lane).into(),
+                front: hit.front,
+            });
+        }
     }
 }
 
@@ -255,14 +226,17 @@ mod tests {
             };
             let packet = RayPacket::of((0..LANES).map(start));
             let hits = world.closest_of(&packet, RayKinds::CAMERA);
-            let lanes = SurfaceLanes::new(&world, &hits);
+            let surfaces = surfaces_of(&world, &hits);
             for (lane, hit) in hits.iter().enumerate() {
                 let Some(hit) = hit else { continue };
                 let (origin, direction) = packet.ray_start(lane);
                 let expected = Surface::new(&world, Ray::new(origin, direction).direction, hit);
-                let found = lanes.surface(lane, &world, direction, hit);
-                assert_eq!(bits(&found), bits(&expected), "{hit:?}");
-                *if lanes.sound[lane] { &mut together } else { &mut alone } += 1;
+                let Some(found) = &surfaces[lane] else {
+                    alone += 1;
+                    continue;
+                };
+                assert_eq!(bits(found), bits(&expected), "{hit:?}");
+                together += 1;
             }
         }
         assert!(together > 20_000 && alone > 100, "{together} and {alone}");

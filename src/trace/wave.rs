@@ -15,7 +15,7 @@ use super::packet::{LANES, RayPacket};
 use super::ray_tree::{Run, TreeNode, WaveHit, WaveRay};
 use super::record::TileRecord;
 use super::surface::Surface;
-use super::surface_lanes::SurfaceLanes;
+use super::surface_lanes::surfaces_of;
 use super::triangle::Ray;
 use super::world::{Hit, World};
 use crate::clock::CpuClock;
@@ -362,17 +362,18 @@ impl<'a> TileTracer<'a> {
         let mut hits = std::mem::take(&mut context.wave_hits);
         for FilmPacket { first, places, count } in film.packets(pixels) {
             let (rays, met) = self.world.closest_of_camera(&self.rays, &places, count);
-            let surfaces = SurfaceLanes::new(self.world, &met);
+            let surfaces = surfaces_of(self.world, &met);
+            let starts = rays.ray_starts();
             work.rays.camera += count as u64;
             for lane in 0..count {
                 let node = run.nodes.len() as u32;
-                let (origin, direction) = rays.ray_start(lane);
+                let (origin, direction) = starts[lane];
                 let ray = WaveRay { origin, direction, node, after: None, passed: 0, media: 0, counted: 0 };
                 run.record.note(&ray, met[lane].as_ref(), true);
                 let mut root = TreeNode::root(first + lane as u32, self.cone);
                 match met[lane] {
                     Some(hit) => {
-                        let surface = surfaces.surface(lane, self.world, direction, &hit);
+                        let surface = surfaces[lane].unwrap_or_else(|| Surface::new(self.world, direction, &hit));
                         hits.push(self.hit_of(&ray, &hit, surface, &root, 0));
                     }
                     None => self.miss(&mut root, direction),
