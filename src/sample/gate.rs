@@ -134,6 +134,7 @@ pub(super) fn clean_color(SampleColor { color, alpha }: SampleColor) -> (SampleC
 }
 
 /// Makes a node what the buffer may hold; returns what was wrong with it. Columns that are not kept are left as they came.
+#[inline]
 pub(super) fn clean_node(node: &mut Node, kept: NodeColumnSet, layout: &SampleLayout) -> Faults {
     let mut faults = Faults::default();
     // A miss has neither place nor style, only what it adds to the picture.

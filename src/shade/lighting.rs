@@ -93,6 +93,7 @@ impl Lighting {
 
     /// What a light gives a point (relative to the camera) if nothing is in between, and how far away it is (∞ for a
     /// sun). A point that lies in the light itself, or farther from it than can be counted, gets nothing.
+    #[inline]
     #[must_use]
     pub fn sample(&self, light: usize, position: Vec3) -> (LightSample, f32) {
         let PlacedLight { form, strength, .. } = &self.lights[light];

@@ -108,6 +108,11 @@ impl RunRecord {
         self.visibility.clear();
     }
 
+    /// Whether anything is noted.
+    pub fn is_wanted(&self) -> bool {
+        self.wanted
+    }
+
     /// Notes what the ray of a node met. What it `met_first` it will meet again; else that depends on shaders.
     #[inline]
     pub fn note(&mut self, ray: &WaveRay, hit: Option<&Hit>, met_first: bool) {

@@ -60,6 +60,7 @@ impl Surface {
 
     /// Where a ray that leaves towards `direction` starts: far enough off the surface, on the right side of it, that
     /// rounding cannot make it meet the surface again (pbrt, section 6.8.6).
+    #[inline]
     #[must_use]
     pub fn leave(&self, direction: Vec3) -> Vec3 {
         let normal = self.geometric_normal;

@@ -368,13 +368,15 @@ impl<'a> TileTracer<'a> {
             for lane in 0..count {
                 let node = run.nodes.len() as u32;
                 let (origin, direction) = starts[lane];
-                let ray = WaveRay { origin, direction, node, after: None, passed: 0, media: 0, counted: 0 };
-                run.record.note(&ray, met[lane].as_ref(), true);
+                let ray = || WaveRay { origin, direction, node, after: None, passed: 0, media: 0, counted: 0 };
+                if run.record.is_wanted() {
+                    run.record.note(&ray(), met[lane].as_ref(), true);
+                }
                 let mut root = TreeNode::root(first + lane as u32, self.cone);
                 match met[lane] {
                     Some(hit) => {
                         let surface = surfaces[lane].unwrap_or_else(|| Surface::new(self.world, direction, &hit));
-                        hits.push(self.hit_of(&ray, &hit, surface, &root, 0));
+                        hits.push(self.hit_of(ray(), &hit, surface, &root, 0));
                     }
                     None => self.miss(&mut root, direction),
                 }
@@ -490,14 +492,14 @@ impl<'a> TileTracer<'a> {
     /// A hit on its way to be shaded.
     #[inline]
     pub(super) fn wave_hit(&self, from: &WaveRay, hit: &Hit, node: &TreeNode, place: usize) -> WaveHit {
-        self.hit_of(from, hit, Surface::new(self.world, from.direction, hit), node, place)
+        self.hit_of(*from, hit, Surface::new(self.world, from.direction, hit), node, place)
     }
 
     /// The same of a surface that is known.
     #[inline]
-    fn hit_of(&self, from: &WaveRay, hit: &Hit, surface: Surface, node: &TreeNode, place: usize) -> WaveHit {
+    fn hit_of(&self, ray: WaveRay, hit: &Hit, surface: Surface, node: &TreeNode, place: usize) -> WaveHit {
         WaveHit {
-            ray: *from,
+            ray,
             hit: *hit,
             surface,
             material: self.world.material(hit),

@@ -21,7 +21,9 @@ pub struct BsdfLanes {
     metallic: Lanes,
     roughness: Lanes,
     specular: Lanes,
-    /// [`Bsdf::dielectric_f0`].
+    ior: Lanes,
+    surrounding: Lanes,
+    /// [`Bsdf::dielectric_f0`], once it is worked out.
     f0: Lanes,
     transmission: Lanes,
     normal: Axes,
@@ -70,6 +72,7 @@ impl Default for LightLanes {
 
 impl LightLanes {
     /// Lights one hit: from a unit direction, with an irradiance on a surface that faces it.
+    #[inline]
     pub fn set(&mut self, lane: usize, direction: Vec3, irradiance: Vec3) {
         set(&mut self.direction, lane, direction);
         set(&mut self.irradiance, lane, irradiance);
@@ -85,6 +88,8 @@ impl Default for BsdfLanes {
             metallic: zero,
             roughness: zero,
             specular: zero,
+            ior: zero,
+            surrounding: zero,
             f0: zero,
             transmission: zero,
             normal: zeros,
@@ -99,12 +104,13 @@ impl Default for BsdfLanes {
 impl BsdfLanes {
     /// Makes a lane a surface seen from `view` (unit, away from it), which emits `emission`. `mirrored` is the background seen in the
     /// mirror direction; it is asked for only if it matters.
+    #[inline]
     pub fn set(&mut self, lane: usize, bsdf: &Bsdf, view: Vec3, emission: Vec3, mirrored: impl FnOnce() -> Vec3) {
         set(&mut self.base_color, lane, bsdf.base_color);
         self.metallic[lane] = bsdf.metallic;
         self.roughness[lane] = bsdf.roughness;
         self.specular[lane] = bsdf.specular;
-        self.f0[lane] = bsdf.dielectric_f0();
+        (self.ior[lane], self.surrounding[lane]) = (bsdf.ior, bsdf.surrounding);
         self.transmission[lane] = bsdf.transmission;
         set(&mut self.normal, lane, bsdf.normal);
         self.occlusion[lane] = bsdf.occlusion;
@@ -124,6 +130,15 @@ impl BsdfLanes {
     /// around, as [`Bsdf::surroundings`] does; of mirrors that is not added.
     pub fn light(&mut self, arch: pulp::Arch, lights: &[LightLanes], ambient: Vec3) {
         arch.dispatch(Light { surfaces: self, lights, ambient });
+    }
+
+    #[inline(always)]
+    fn find_f0(&mut self) {
+        for i in 0..LANES {
+            let relative = self.ior[i] / self.surrounding[i];
+            let r = (relative - 1.0) / (relative + 1.0);
+            self.f0[i] = r * r * self.specular[i];
+        }
     }
 
     #[inline(always)]
@@ -187,6 +202,7 @@ impl BsdfLanes {
             view,
             mirrored,
             radiance,
+            ..
         } = self;
         let [[nx, ny, nz], [vx, vy, vz]] = [&*normal, &*view];
         let mut sums = *radiance;
@@ -234,6 +250,7 @@ impl pulp::WithSimd for Light<'_> {
 
     #[inline(always)]
     fn with_simd<S: pulp::Simd>(self, _: S) {
+        self.surfaces.find_f0();
         for light in self.lights {
             self.surfaces.add_light(light);
         }

@@ -55,6 +55,7 @@ pub fn unit(share: f32, default: f32) -> f32 {
 
 impl Bsdf {
     /// The same with every parameter in its range; NaN becomes the default.
+    #[inline]
     #[must_use]
     pub fn checked(mut self) -> Self {
         self.metallic = unit(self.metallic, 0.0);
