@@ -7,9 +7,10 @@
 use std::ops::Range;
 
 use super::eight::{Eights, Task, dispatch};
+use super::film::FilmPacket;
 use super::packet::Bundle;
 use super::tree::{Leaf, Visitor};
-use super::wave::{FilmPacket, TileTracer};
+use super::wave::TileTracer;
 use super::world::World;
 use crate::math::Vec3;
 use crate::sample::{Node, NodePath, PixelRect, SampleBufferBuilder, SampleColor};

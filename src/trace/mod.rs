@@ -8,7 +8,7 @@
 //! - [`wave`]: the rays of a tile, one depth of the ray tree at a time; `shadow` finds what lights give a hit, `scatter`
 //!   shades hits and sends rays on; `media` knows which bodies of glass a ray is in; `list` keeps what the line pass wants to
 //!   know of surfaces behind the first.
-//! - `clear`: pixels that surely show the background alone, for which nothing is traced.
+//! - `film`: where a tile's samples lie; `clear`: pixels that surely show the background alone, for which nothing is traced.
 //! - `record`: what the rays of a tile met, so that it can be shaded again without tracing; `restyle`: only its lines.
 //!
 //! Everything here works relative to the camera's position, so that precision is best where the camera looks from,
@@ -17,6 +17,7 @@
 mod clear;
 mod cone;
 pub mod eight;
+mod film;
 mod hits;
 mod list;
 mod media;

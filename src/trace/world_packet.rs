@@ -192,6 +192,21 @@ fn each_object<E: Eights>(eights: E, world: &World, rays: &LaneRays, kind: RayKi
     true
 }
 
+/// [`Visit::size`] of rays of the world that are placed in an object.
+#[inline(always)]
+fn size_of_starts(rays: &LaneRays, object: &PlacedObject, placed: &LaneRays) -> f32 {
+    placed.largest_start().max(object.grain(Vec3::splat(rays.largest_start())).max_element())
+}
+
+/// Looks for what is in an object with rays in its space, together if they are a packet there.
+#[inline(always)]
+fn search_object<E: Eights>(eights: E, object: &PlacedObject, placed: &LaneRays, search: &mut impl Visit) {
+    match placed.shear() {
+        Some(shear) => intersect(eights, &object.tree, placed, &shear, search),
+        None => packet::one_by_one(&object.tree, placed, search),
+    }
+}
+
 /// Looks at the objects of leaves.
 struct Objects<'a, S> {
     world: &'a World,
@@ -252,13 +267,10 @@ impl Search for Nearest<'_> {
         near: &Lanes,
         reach: Lanes,
     ) {
-        let size = placed.largest_start().max(object.grain(Vec3::splat(self.rays.largest_start())).max_element());
+        let size = size_of_starts(self.rays, object, placed);
         let (rays, culls, found) = (self.rays, self.culls, &mut *self.found);
         let mut search = InObject { found, id, object, rays, size, culls, near, reach };
-        match placed.shear() {
-            Some(shear) => intersect(eights, &object.tree, placed, &shear, &mut search),
-            None => packet::one_by_one(&object.tree, placed, &mut search),
-        }
+        search_object(eights, object, placed, &mut search);
     }
 }
 
@@ -387,12 +399,9 @@ impl<O: Fn(MaterialId) -> bool> Search for Ways<'_, O> {
         _: &Lanes,
         reach: Lanes,
     ) {
-        let size = placed.largest_start().max(object.grain(Vec3::splat(self.rays.largest_start())).max_element());
+        let size = size_of_starts(self.rays, object, placed);
         let mut search = AnyInObject { id, object, size, reach, found: self };
-        match placed.shear() {
-            Some(shear) => intersect(eights, &object.tree, placed, &shear, &mut search),
-            None => packet::one_by_one(&object.tree, placed, &mut search),
-        }
+        search_object(eights, object, placed, &mut search);
     }
 }
 
