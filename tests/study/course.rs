@@ -113,10 +113,12 @@ fn a_study_writes_a_table_numbers_pictures_and_a_page() {
     assert_eq!((&fit["knob"], &fit["error"]), (&"samples".into(), &"line_coverage".into()));
     let slope = fit["exponent"]["by_samples"].as_f64().expect("a slope is fitted");
     assert!((-1.0..-0.4).contains(&slope), "{slope}");
-    let is_bauer = |point: &&Value| point["settings"]["samples"] == 4 && point["settings"]["method"] == "bauer";
-    let bauer = points.iter().find(is_bauer).expect("bauer was tried");
-    let bauer = bauer["errors"]["line_coverage"]["mean"].as_f64().expect("there are lines");
-    assert!(bauer > coverage(4), "the exact search is nearer to the truth: {bauer} {}", coverage(4));
+    for method in ["bauer", "path"] {
+        let is_it = |point: &&Value| point["settings"]["samples"] == 4 && point["settings"]["method"] == method;
+        let other = points.iter().find(is_it).unwrap_or_else(|| panic!("{method} was tried"));
+        let other = other["errors"]["line_coverage"]["mean"].as_f64().expect("there are lines");
+        assert!(other > coverage(4), "the exact search is nearer to the truth: {method} {other} {}", coverage(4));
+    }
     // A square has corners.
     assert!(
         points.iter().all(|point| point["errors"]["line_crossings"]["mean"].as_f64().is_some_and(|error| error > 0.0))
@@ -125,7 +127,7 @@ fn a_study_writes_a_table_numbers_pictures_and_a_page() {
         for errors in [&time["errors"]["line_coverage"], &time["errors"]["line_crossings"]] {
             let of = |method: &str| errors[method].as_f64();
             // Which of the others can be compared, and how they do, depends on the machine.
-            let all = ["exact", "choudhury", "bauer"].into_iter().filter_map(of);
+            let all = ["exact", "choudhury", "bauer", "path"].into_iter().filter_map(of);
             assert!(of("exact").is_some() && all.into_iter().all(|error| error > 0.0), "{time}");
         }
     }

@@ -86,13 +86,13 @@ pub const fn gap_factor(sampler: Sampler) -> f32 {
 
 /// A 32-bit mix of three numbers, the same on every machine (the finaliser of PCG's RXS-M-XS family, chained).
 #[inline]
-fn mix(a: u32, b: u32, c: u32) -> u32 {
+pub(crate) fn mix(a: u32, b: u32, c: u32) -> u32 {
     step(a ^ step(b ^ step(c)))
 }
 
 /// A 32-bit mix of one number.
 #[inline]
-fn step(state: u32) -> u32 {
+pub(crate) fn step(state: u32) -> u32 {
     let state = state.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
     let word = ((state >> ((state >> 28) + 4)) ^ state).wrapping_mul(277_803_737);
     (word >> 22) ^ word
