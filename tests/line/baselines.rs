@@ -93,13 +93,13 @@ fn lined_by_path(probes: i32) -> [f64; 2] {
 /// The counts are so near to what is expected that one probe more or less would be noticed.
 #[test]
 fn path_lines_a_straight_edge_as_often_as_its_probes_meet_what_lies_beyond() {
-    let film = PixelRect { x0: 0, y0: 0, x1: 16, y1: 120 };
-    let inner = 4..116;
+    let film = PixelRect { x0: 0, y0: 0, x1: 16, y1: 248 };
+    let inner = 4..244;
     let settings =
         LineSettings { width: WIDTH, max_width: WIDTH, width_compensation: false, ..LineSettings::default() };
     let layout = layout(64, WIDTH);
     let node = |[x, _]: [f32; 2]| hit(1 + u32::from(x > 8.3));
-    let tiles = Tiles::new(film, 128, &Rules::new(&settings, 64), |tile| sampled(tile, &layout, &node));
+    let tiles = Tiles::new(film, 256, &Rules::new(&settings, 64), |tile| sampled(tile, &layout, &node));
     let in_reach = f64::from(WIDTH) * 64.0 * inner.len() as f64;
     for probes in [1, 2, 4, 8, 16, 64] {
         let lines = tiles.lines_of(0, Method::Path { probes });

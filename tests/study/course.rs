@@ -77,8 +77,8 @@ fn a_study_writes_a_table_numbers_pictures_and_a_page() {
              line_coverage,line_position,line_crossings"
         )
     );
-    // 8 rates, 3 presets with a sampler of their own, and 2 more methods at 3 rates, twice.
-    assert_eq!(table.lines().count(), 1 + 2 * (8 + 3 + 2 * 3));
+    // 8 rates, 3 presets with a sampler of their own, and 3 more methods at 3 rates, twice.
+    assert_eq!(table.lines().count(), 1 + 2 * (8 + 3 + 3 * 3));
 
     let found = numbers(&place.folder.path().join("out"));
     let keys: Vec<_> = found.as_object().map(|map| map.keys().map(String::as_str).collect()).unwrap_or_default();
@@ -86,7 +86,7 @@ fn a_study_writes_a_table_numbers_pictures_and_a_page() {
     assert_eq!(keys.join(" "), expected);
     assert_eq!((&found["complete"], &found["left_out_for_time"]), (&Value::Bool(true), &Value::from(0)));
     let points = found["points"].as_array().expect("there are points");
-    assert_eq!(points.len(), 17);
+    assert_eq!(points.len(), 20);
     let coverage = |samples: u64| {
         let is_it = |point: &&Value| point["settings"]["samples"] == samples && point["settings"]["method"] == "exact";
         let point = points.iter().find(is_it).expect("the point was measured");
@@ -185,7 +185,7 @@ fn a_stopped_study_goes_on_and_comes_to_the_same() {
     place.run(&[&FEW[..], &["-o", "whole"]].concat()).exits(0);
     place.run(&[&FEW[..], &["-o", "parts", "--threads", "1"]].concat()).exits(0);
     let table = read(&place, "whole/study.csv");
-    assert_eq!(table.lines().count(), 1 + 18);
+    assert_eq!(table.lines().count(), 1 + 24);
 
     // As if it had been stopped after two pictures.
     let begun: Vec<_> = table.lines().take(3).collect();
@@ -206,7 +206,7 @@ fn a_stopped_study_goes_on_and_comes_to_the_same() {
     // Another scene, or another reference: nothing of it is of use.
     place.run(&[&FEW[..], &["-o", "parts", "--set", "lines.width=3"]].concat()).exits(0);
     let other = read(&place, "parts/study.csv");
-    assert_eq!(other.lines().count(), 1 + 18);
+    assert_eq!(other.lines().count(), 1 + 24);
     assert!(begun[1..].iter().all(|row| !other.contains(row)));
 }
 
@@ -227,7 +227,7 @@ fn a_budget_takes_what_tells_most_first() {
 
     let place = place();
     place.run(&[&FEW[..], &["-o", "out", "--budget", "1h"]].concat()).exits(0);
-    assert_eq!(read(&place, "out/study.csv").lines().count(), 1 + 18);
+    assert_eq!(read(&place, "out/study.csv").lines().count(), 1 + 24);
     place
         .run(&[&FEW[..], &["-o", "none", "--budget", "0.000001s"]].concat())
         .exits(1)
@@ -237,7 +237,7 @@ fn a_budget_takes_what_tells_most_first() {
     place.file("scene.toml", SCENE);
     let run = place.run(&["study", "scene.toml", "-o", "out", "--budget", "0.000001s", "--reference", "32"]).exits(0);
     assert!(run.stderr().contains("did not fit into the budget"), "{}", run.stderr());
-    assert_eq!(numbers(&place.folder.path().join("out"))["points"].as_array().map(Vec::len), Some(9));
+    assert_eq!(numbers(&place.folder.path().join("out"))["points"].as_array().map(Vec::len), Some(12));
 }
 
 #[test]
