@@ -25,6 +25,7 @@ mod rules;
 mod search;
 mod style;
 mod types;
+mod widening;
 mod window;
 
 pub use bounds::TileBounds;
