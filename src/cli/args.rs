@@ -230,8 +230,8 @@ pub struct SceneArguments {
     /// shows the first; an .exr holds exactly these [default: rgba; all but line.TYPE, line.PATH and below].
     #[arg(long, value_name = "NAME")]
     pub layer: Vec<String>,
-    /// How lines are found: `exact` is fast, `brute` tries every pair and gives the same picture; `choudhury` (2009) and
-    /// `bauer` (2017) are older methods, to compare with.
+    /// How lines are found: `exact` is fast, `brute` tries every pair and gives the same picture; `choudhury` (2009),
+    /// `bauer` (2017) and `path` (West 2021) are other methods, to compare with.
     #[arg(long, value_name = "HOW", default_value = "exact")]
     pub lines: LineMode,
     /// How shaders are run: `kernel` refuses scripts that cannot be compiled, `interpreter` gives the same picture slowly.
@@ -312,6 +312,7 @@ pub enum LineMode {
     Brute,
     Choudhury,
     Bauer,
+    Path,
 }
 
 impl LineMode {
@@ -321,6 +322,7 @@ impl LineMode {
             Self::Brute => Method::Brute,
             Self::Choudhury => Method::Choudhury,
             Self::Bauer => Method::Bauer,
+            Self::Path => Method::PATH,
         }
     }
 }

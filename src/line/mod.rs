@@ -25,6 +25,7 @@ mod rules;
 mod search;
 mod style;
 mod types;
+mod widening;
 mod window;
 
 pub use bounds::TileBounds;
@@ -54,6 +55,16 @@ pub enum Method {
     Choudhury,
     /// Bauer 2017: one style, a contour image of sub-pixels; camera nodes only.
     Bauer,
+    /// West 2021: as exact, with some neighbours drawn at random instead of all; first surfaces only.
+    Path {
+        /// How many.
+        probes: u32,
+    },
+}
+
+impl Method {
+    /// [`Method::Path`] with the most probes that are published.
+    pub const PATH: Self = Self::Path { probes: 16 };
 }
 
 /// The line that a sample sees. With [`Rules::with_any_pair`], `fired`, `neighbor` and `own` may be those of another pair
@@ -170,7 +181,7 @@ impl LineBuffer {
 /// Work done by the line pass.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LineCounts {
-    /// Target–neighbour pairs whose attributes or distance were looked at.
+    /// Target–neighbour pairs whose attributes or distance were looked at; probes of [`Method::Path`].
     pub pairs_tested: u64,
     /// Samples that see a line, hidden ones included.
     pub lined_samples: u64,
@@ -265,6 +276,8 @@ fn find(
                 lines = baselines::bauer(&at_path, &targets, rules, &mut counts);
                 break;
             }
+            Method::Path { .. } if kind == Kind::Hidden => break,
+            Method::Path { probes } => baselines::path(&at_path, &targets, &lined, rules, probes, &mut counts),
         };
         style::style(&at_path, &targets, &found, rules, scripts.as_deref_mut(), &mut gate, |sample, line| {
             lined[sample as usize] = true;

@@ -4,9 +4,9 @@ use super::differ::Tests;
 use super::materials::MaterialTests;
 use super::style::LineScript;
 use super::types::TypeRules;
-use crate::math::{Vec3, portable};
+use super::widening::Widening;
+use crate::math::Vec3;
 use crate::sample::NodePath;
-use crate::sample::position::gap_factor;
 use crate::scene::settings::{Composition, LineOverrides, LineSettings, RayKinds, Sampler, TypeStyle};
 
 /// [`LineSettings`] with all that follows from them and the sample rate worked out once.
@@ -15,8 +15,7 @@ pub struct Rules {
     settings: LineSettings,
     /// Widths above this count as this.
     widest: f32,
-    /// Mean gap to the nearest sample beyond an edge, for a half width of 1 px.
-    unit_gap: f64,
+    widening: Widening,
     /// The loosest tests of any material.
     tests: Tests,
     materials: Option<MaterialTests>,
@@ -57,12 +56,9 @@ impl Rules {
     /// The same for samples of any sampler.
     #[must_use]
     pub fn for_sampler(settings: &LineSettings, sampler: Sampler, samples_per_pixel: u32) -> Self {
-        // h(r, ρ) = c · (3 / (4 √(2r) ρ))^(2/3) falls with the cube root of r alone: DESIGN section 3.9.
-        let per_side = 3.0 / (4.0 * samples_per_pixel.max(1) as f32);
-        let unit_gap = gap_factor(sampler) * portable::pow(per_side, 2.0 / 3.0) / portable::cbrt(2.0);
         let mut rules = Self {
             widest: settings.max_width.max(0.0),
-            unit_gap: f64::from(unit_gap),
+            widening: Widening::new(sampler, samples_per_pixel),
             tests: Tests::new(settings),
             materials: None,
             types: None,
@@ -129,7 +125,7 @@ impl Rules {
         let widths = |rules: &Self| {
             let settings = &rules.settings;
             let narrowed = rules.clone().with_widest(narrower);
-            (settings.min_width, settings.width_compensation, rules.unit_gap, narrowed.types)
+            (settings.min_width, settings.width_compensation, rules.widening, narrowed.types)
         };
         read(self) == read(other)
             && widths(self) == widths(other)
@@ -273,7 +269,7 @@ impl Rules {
             return 0.0;
         }
         let half = width.max(self.settings.min_width) / 2.0;
-        if self.settings.width_compensation { widened(half, self.unit_gap) } else { half }
+        if self.settings.width_compensation { self.widening.radius(half) } else { half }
     }
 
     /// How much of the sample a line of this full width covers: 1, or less below the minimum width (OG18 section 3.5).
@@ -298,26 +294,6 @@ impl Rules {
         needed.set(RayKinds::REFLECTION, path.has_reflection());
         needed.set(RayKinds::REFRACTION, path.has_refraction());
         self.settings.paths.contains(needed)
-    }
-}
-
-/// The r with r − gap / ∛r = half.
-///
-/// With s = ∛r that is s⁴ − half · s − gap = 0: convex for s > 0, so Newton's steps from above fall to the root and stop
-/// by themselves. ∛half + ∜gap is above it; it decides only how many steps are needed.
-fn widened(half: f32, gap: f64) -> f32 {
-    let half = f64::from(half);
-    // The factor makes up for the rounding of the f32 root.
-    let mut s = (f64::from(portable::cbrt(half as f32)) + gap.sqrt().sqrt()) * (1.0 + 1e-6);
-    loop {
-        let cube = s * s * s;
-        let next = s - (s * cube - half * s - gap) / (4.0 * cube - half);
-        if next < s {
-            s = next;
-        } else {
-            // As near as f64 comes.
-            return cube as f32;
-        }
     }
 }
 

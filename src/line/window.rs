@@ -85,6 +85,12 @@ impl<'a> PathWindow<'a> {
             .filter_map(|index| Some((index, self.tiles.get(index)?.as_ref()?)))
     }
 
+    /// The tile that a pixel lies in, if it has nodes, with its place in the window.
+    pub(super) fn tile_of(&self, [x, y]: [i32; 2]) -> Option<(usize, &PathTile<'a>)> {
+        self.tiles_in(PixelRect { x0: x, y0: y, x1: x + 1, y1: y + 1 })
+            .find(|(_, tile)| tile.buffer.rect.contains(x, y))
+    }
+
     /// The rows of pixels of a rectangle, cut at tile borders, from the top, each from the left.
     pub(super) fn segments(&self, rect: PixelRect) -> impl Iterator<Item = Segment<'_, 'a>> {
         let height = self.tile * self.tiles.len().div_ceil(self.columns.max(1)) as i32;

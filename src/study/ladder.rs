@@ -174,7 +174,7 @@ impl Settings {
 }
 
 /// The methods that a study compares.
-pub const METHODS: [Method; 3] = [Method::Exact, Method::Choudhury, Method::Bauer];
+pub const METHODS: [Method; 4] = [Method::Exact, Method::Choudhury, Method::Bauer, Method::PATH];
 
 /// As on the command line.
 #[must_use]
@@ -184,6 +184,7 @@ pub fn method_name(method: Method) -> &'static str {
         Method::Brute => "brute",
         Method::Choudhury => "choudhury",
         Method::Bauer => "bauer",
+        Method::Path { .. } => "path",
     }
 }
 
@@ -215,7 +216,7 @@ pub struct Ladder {
 const SAMPLES: [u32; 8] = [1, 2, 4, 9, 16, 36, 64, 144];
 /// Counts that suit every sampler.
 const SAMPLER_SAMPLES: [u32; 3] = [4, 16, 64];
-/// Counts of line methods. The older ones take so much longer that the exact search has four times as many in the same time.
+/// Counts of line methods. The others take so much longer that the exact search has four times as many in the same time.
 const METHOD_SAMPLES: [u32; 3] = [1, 4, 16];
 /// How many times as many samples there are at lines.
 const LINE_OVERSAMPLING: [u32; 3] = [1, 4, 16];

@@ -305,3 +305,27 @@ proptest! {
         }
     }
 }
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 24, failure_persistence: None, ..ProptestConfig::default() })]
+
+    /// Few random neighbours line some of the samples that all do, whatever the tiles; so many that each is met draw the same.
+    #[test]
+    fn the_path_method_is_the_oracle_with_some_of_the_neighbors(mut case in case()) {
+        (case.settings.surfaces, case.settings.hidden) = (1, None);
+        let whole = case.cut(64, case.rules());
+        let expected = case.by_place(&whole.lines(Method::Brute));
+        let every = 25 * case.samples.len() as u32;
+        prop_assert_eq!(&case.by_place(&whole.lines(Method::Path { probes: every })), &expected);
+
+        let few = case.by_place(&whole.lines(Method::Path { probes: 3 }));
+        let places = |lines: &[([i32; 2], u32, Bits)]| -> std::collections::BTreeSet<_> {
+            lines.iter().map(|(pixel, sample, _)| (*pixel, *sample)).collect()
+        };
+        prop_assert!(places(&few).is_subset(&places(&expected)));
+        for side in case.tiles {
+            let cut = case.cut(side, case.rules());
+            prop_assert_eq!(&case.by_place(&cut.lines(Method::Path { probes: 3 })), &few, "tiles of {}", side);
+        }
+    }
+}

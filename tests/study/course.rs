@@ -77,8 +77,8 @@ fn a_study_writes_a_table_numbers_pictures_and_a_page() {
              line_coverage,line_position,line_crossings"
         )
     );
-    // 8 rates, 3 presets with a sampler of their own, and 2 more methods at 3 rates, twice.
-    assert_eq!(table.lines().count(), 1 + 2 * (8 + 3 + 2 * 3));
+    // 8 rates, 3 presets with a sampler of their own, and 3 more methods at 3 rates, twice.
+    assert_eq!(table.lines().count(), 1 + 2 * (8 + 3 + 3 * 3));
 
     let found = numbers(&place.folder.path().join("out"));
     let keys: Vec<_> = found.as_object().map(|map| map.keys().map(String::as_str).collect()).unwrap_or_default();
@@ -86,7 +86,7 @@ fn a_study_writes_a_table_numbers_pictures_and_a_page() {
     assert_eq!(keys.join(" "), expected);
     assert_eq!((&found["complete"], &found["left_out_for_time"]), (&Value::Bool(true), &Value::from(0)));
     let points = found["points"].as_array().expect("there are points");
-    assert_eq!(points.len(), 17);
+    assert_eq!(points.len(), 20);
     let coverage = |samples: u64| {
         let is_it = |point: &&Value| point["settings"]["samples"] == samples && point["settings"]["method"] == "exact";
         let point = points.iter().find(is_it).expect("the point was measured");
@@ -113,10 +113,12 @@ fn a_study_writes_a_table_numbers_pictures_and_a_page() {
     assert_eq!((&fit["knob"], &fit["error"]), (&"samples".into(), &"line_coverage".into()));
     let slope = fit["exponent"]["by_samples"].as_f64().expect("a slope is fitted");
     assert!((-1.0..-0.4).contains(&slope), "{slope}");
-    let is_bauer = |point: &&Value| point["settings"]["samples"] == 4 && point["settings"]["method"] == "bauer";
-    let bauer = points.iter().find(is_bauer).expect("bauer was tried");
-    let bauer = bauer["errors"]["line_coverage"]["mean"].as_f64().expect("there are lines");
-    assert!(bauer > coverage(4), "the exact search is nearer to the truth: {bauer} {}", coverage(4));
+    for method in ["bauer", "path"] {
+        let is_it = |point: &&Value| point["settings"]["samples"] == 4 && point["settings"]["method"] == method;
+        let other = points.iter().find(is_it).unwrap_or_else(|| panic!("{method} was tried"));
+        let other = other["errors"]["line_coverage"]["mean"].as_f64().expect("there are lines");
+        assert!(other > coverage(4), "the exact search is nearer to the truth: {method} {other} {}", coverage(4));
+    }
     // A square has corners.
     assert!(
         points.iter().all(|point| point["errors"]["line_crossings"]["mean"].as_f64().is_some_and(|error| error > 0.0))
@@ -125,7 +127,7 @@ fn a_study_writes_a_table_numbers_pictures_and_a_page() {
         for errors in [&time["errors"]["line_coverage"], &time["errors"]["line_crossings"]] {
             let of = |method: &str| errors[method].as_f64();
             // Which of the others can be compared, and how they do, depends on the machine.
-            let all = ["exact", "choudhury", "bauer"].into_iter().filter_map(of);
+            let all = ["exact", "choudhury", "bauer", "path"].into_iter().filter_map(of);
             assert!(of("exact").is_some() && all.into_iter().all(|error| error > 0.0), "{time}");
         }
     }
@@ -183,7 +185,7 @@ fn a_stopped_study_goes_on_and_comes_to_the_same() {
     place.run(&[&FEW[..], &["-o", "whole"]].concat()).exits(0);
     place.run(&[&FEW[..], &["-o", "parts", "--threads", "1"]].concat()).exits(0);
     let table = read(&place, "whole/study.csv");
-    assert_eq!(table.lines().count(), 1 + 18);
+    assert_eq!(table.lines().count(), 1 + 24);
 
     // As if it had been stopped after two pictures.
     let begun: Vec<_> = table.lines().take(3).collect();
@@ -204,7 +206,7 @@ fn a_stopped_study_goes_on_and_comes_to_the_same() {
     // Another scene, or another reference: nothing of it is of use.
     place.run(&[&FEW[..], &["-o", "parts", "--set", "lines.width=3"]].concat()).exits(0);
     let other = read(&place, "parts/study.csv");
-    assert_eq!(other.lines().count(), 1 + 18);
+    assert_eq!(other.lines().count(), 1 + 24);
     assert!(begun[1..].iter().all(|row| !other.contains(row)));
 }
 
@@ -225,7 +227,7 @@ fn a_budget_takes_what_tells_most_first() {
 
     let place = place();
     place.run(&[&FEW[..], &["-o", "out", "--budget", "1h"]].concat()).exits(0);
-    assert_eq!(read(&place, "out/study.csv").lines().count(), 1 + 18);
+    assert_eq!(read(&place, "out/study.csv").lines().count(), 1 + 24);
     place
         .run(&[&FEW[..], &["-o", "none", "--budget", "0.000001s"]].concat())
         .exits(1)
@@ -235,7 +237,7 @@ fn a_budget_takes_what_tells_most_first() {
     place.file("scene.toml", SCENE);
     let run = place.run(&["study", "scene.toml", "-o", "out", "--budget", "0.000001s", "--reference", "32"]).exits(0);
     assert!(run.stderr().contains("did not fit into the budget"), "{}", run.stderr());
-    assert_eq!(numbers(&place.folder.path().join("out"))["points"].as_array().map(Vec::len), Some(9));
+    assert_eq!(numbers(&place.folder.path().join("out"))["points"].as_array().map(Vec::len), Some(12));
 }
 
 #[test]

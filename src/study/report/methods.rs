@@ -17,8 +17,9 @@ pub(super) fn section(study: &Study, summary: &Summary, figures: &mut Figures) -
         return String::new();
     }
     let mut html = "<h2>Line methods in equal time</h2>\n<p>Each method draws lines from the same samples: <i>exact</i> as Tusche does, \
-                    <i>choudhury</i> (Choudhury and Parker 2009) and <i>bauer</i> (Bauer 2017) with one style for all lines. What they differ \
-                    by is shown where lines are, and where they meet: crossings, junctions, corners, lines side by side.</p>\n"
+                    <i>choudhury</i> (Choudhury and Parker 2009) and <i>bauer</i> (Bauer 2017) with one style for all lines, <i>path</i> \
+                    (West 2021) by 16 random neighbours, for which that method would trace 16 more rays. What they differ by is shown where lines \
+                    are, and where they meet: crossings, junctions, corners, lines side by side.</p>\n"
         .to_owned();
     html += &legend(METHODS.into_iter().map(|method| method_name(method).to_owned()).enumerate());
     html.push_str("<div class=\"two\">\n");
