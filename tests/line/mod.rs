@@ -11,3 +11,4 @@ mod objects;
 mod overlap;
 pub mod picture;
 mod seen;
+mod through;
