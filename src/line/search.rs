@@ -31,7 +31,7 @@
 use super::bounds::{Block, Bounded, PathBounds, PixelNodes, Stylist};
 use super::differ::{Fired, Tests};
 use super::lanes::{LaneTarget, Lanes, Origin};
-use super::materials::{certainty, may_differ, may_matter};
+use super::materials::{certainty, may_differ, may_matter, radii_squared};
 use super::overlap::Facet;
 use super::pair::{Found, LineNode, Pair, Rank, distance_squared};
 use super::through::Through;
@@ -388,6 +388,10 @@ impl<'w> Search<'w, '_> {
                     continue;
                 }
                 let bounded = bounds.of_pixel(place as usize);
+                let [thinnest_squared, widest_squared] = radii_squared(self.rules, targets, &bounded, bounded.bounds);
+                if gap_squared >= widest_squared {
+                    continue;
+                }
                 // Their materials decide.
                 let Some(certain) = certainty(self.rules, targets, &bounded, gap_squared, bounded.bounds) else {
                     continue;
@@ -395,7 +399,7 @@ impl<'w> Search<'w, '_> {
                 self.candidates.push(Candidate { tile, pixel: neighbors, gap_squared, certain });
                 if certain
                     && neighbors.bounds.best.outranks(targets.bounds.highest)
-                    && far_squared(pixel, neighbors.pixel) < neighbors.bounds.thinnest_squared
+                    && far_squared(pixel, neighbors.pixel) < thinnest_squared
                 {
                     floor = floor.better(neighbors.bounds.best);
                 }
@@ -428,7 +432,7 @@ impl<'w> Search<'w, '_> {
             own.limit = own.limit.max(limit);
             own.add(&target.node, self.rules);
         }
-        if own.limit > 0.0 || own.thinnest < f32::INFINITY {
+        if own.limit > 0.0 {
             self.collect_own(pixel, bounded, own);
             let (mut next, mut batch) = (0, FIRST_BATCH);
             while let Some(first) = self.candidates.get(next).map(|candidate| candidate.gap_squared) {
@@ -487,13 +491,18 @@ impl<'w> Search<'w, '_> {
                     continue;
                 }
                 let bounded = bounds.of_pixel(place as usize);
+                let [thinnest_squared, widest_squared] = radii_squared(self.rules, targets, &bounded, targets.bounds);
+                if gap_squared >= widest_squared {
+                    continue;
+                }
                 // The targets' materials decide.
                 let Some(certain) = certainty(self.rules, targets, &bounded, gap_squared, targets.bounds) else {
                     continue;
                 };
                 self.candidates.push(Candidate { tile, pixel: neighbors, gap_squared, certain });
                 if certain {
-                    own.narrow(far_squared(pixel, neighbors.pixel), neighbors.bounds.lowest);
+                    let far_squared = far_squared(pixel, neighbors.pixel);
+                    own.narrow(far_squared, thinnest_squared, neighbors.bounds.lowest);
                 }
             }
         }
@@ -553,7 +562,7 @@ pub(super) fn keep(window: &PathWindow<'_>, rules: &Rules, target: &mut Target, 
 pub(super) struct OwnTargets {
     pub highest: Rank,
     lowest: Rank,
-    /// The smallest squared radius.
+    /// The smallest squared radius of a line of any type.
     thinnest: f32,
     /// The squared distance within which each is sure to find its line, if it has one.
     pub limit: f32,
@@ -570,9 +579,11 @@ impl OwnTargets {
         self.lowest = self.lowest.worse(target.rank);
     }
 
-    /// Lowers the limit by a set of nodes within this squared distance that surely differ from all, the last of this rank.
-    pub(super) fn narrow(&mut self, far_squared: f32, lowest: Rank) {
-        if far_squared < self.limit.min(self.thinnest) && !lowest.outranks(self.lowest) {
+    /// Lowers the limit by nodes within this squared distance that surely differ from all, the last of this rank; lines
+    /// beside them have at least this squared radius.
+    pub(super) fn narrow(&mut self, far_squared: f32, thinnest_squared: f32, lowest: Rank) {
+        let in_reach = far_squared < self.thinnest.max(thinnest_squared);
+        if in_reach && far_squared < self.limit && !lowest.outranks(self.lowest) {
             self.limit = far_squared;
         }
     }

@@ -17,7 +17,7 @@ use smallvec::{SmallVec, smallvec};
 use super::Rules;
 use super::bounds::{self, Bounded, Bounds, PixelNodes, Shape};
 use super::lanes::{Lanes, Origin};
-use super::materials::{certainty, may_matter};
+use super::materials::{certainty, may_matter, radii_squared};
 use super::overlap::{Facet, FacetBounds};
 use super::pair::{MOST_LINES, Pair, Rank, is_opaque};
 use super::search::{FIRST_BATCH, Near, OwnTargets, Target, far_squared, keep, pixel_gap_squared, reached};
@@ -313,7 +313,8 @@ impl<'w, 'a> Through<'w, 'a> {
         for candidate in &*candidates {
             let area = &self.groups[candidate.group as usize].area;
             let neighbors = &area.bounds;
-            if floor.outranks(neighbors.best) || candidate.gap_squared >= neighbors.radius_squared {
+            let [thinnest_squared, widest_squared] = radii_squared(self.rules, targets, &area.bounded(), neighbors);
+            if floor.outranks(neighbors.best) || candidate.gap_squared >= widest_squared {
                 continue;
             }
             // Their materials decide.
@@ -323,7 +324,7 @@ impl<'w, 'a> Through<'w, 'a> {
             found.push(*candidate);
             if certain
                 && neighbors.best.outranks(targets.bounds.highest)
-                && far_squared(pixel, candidate.pixel) < neighbors.thinnest_squared
+                && far_squared(pixel, candidate.pixel) < thinnest_squared
             {
                 floor = floor.better(neighbors.best);
             }
@@ -377,7 +378,9 @@ impl<'w, 'a> Through<'w, 'a> {
         let mut found: SmallVec<[Candidate; 32]> = SmallVec::new();
         for candidate in candidates.iter().filter(|_| !open.is_empty()) {
             let area = &self.groups[candidate.group as usize].area;
-            if candidate.gap_squared > own.limit || area.bounds.lowest.outranks(own.highest) {
+            let [thinnest_squared, widest_squared] =
+                radii_squared(self.rules, targets, &area.bounded(), targets.bounds);
+            if candidate.gap_squared > own.limit.min(widest_squared) || area.bounds.lowest.outranks(own.highest) {
                 continue;
             }
             // The targets' materials decide.
@@ -386,7 +389,7 @@ impl<'w, 'a> Through<'w, 'a> {
             all_certain &= certain;
             found.push(*candidate);
             if certain {
-                own.narrow(far_squared(pixel, candidate.pixel), area.bounds.lowest);
+                own.narrow(far_squared(pixel, candidate.pixel), thinnest_squared, area.bounds.lowest);
             }
         }
         found.sort_by(|a, b| a.gap_squared.total_cmp(&b.gap_squared));
