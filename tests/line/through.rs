@@ -70,7 +70,7 @@ fn lines_that_are_seen_through_cost_little_more_than_opaque_ones() {
             assert_eq!(counts.lined_samples, opaque.lined_samples);
             let ratio = counts.pairs_tested as f64 / opaque.pairs_tested as f64;
             assert!(ratio < most, "{surfaces} surfaces, {samples} samples, normal {normal:?}: {ratio} times the pairs");
-            // Most lines have nothing behind them but, at their inner half, nothing at all.
+            // Near edges of two balls lines lie one behind the other; elsewhere there is one.
             let asked = script.lines as f64 / counts.lined_samples as f64;
             assert!((1.02..1.5).contains(&asked), "{surfaces} surfaces: {asked} lines a lined sample");
             assert_eq!(script.calls, 1, "all lines of a material at a path are asked for at once");
