@@ -2,7 +2,7 @@
 //! That they are the oracle's for all kinds of samples is tested in `equal`.
 
 use tusche::line::{LineBuffer, LineScript, LineScripts, LineTile, Method, Rules, TileBounds, Window, find_lines};
-use tusche::sample::{HandMadeSample, Node, PairBatch, PixelRect, SampleBuffer};
+use tusche::sample::{HandMadeSample, Node, NodePath, PairBatch, PixelRect, SampleBuffer};
 use tusche::scene::settings::LineSettings;
 
 use super::picture::{layout, sampled};
@@ -76,7 +76,8 @@ fn lines_that_are_seen_through_cost_little_more_than_opaque_ones() {
             assert_eq!(script.calls, 1, "all lines of a material at a path are asked for at once");
             if samples == 16 {
                 let brute = lines(&buffer, &rules, Method::Brute, Some(&mut Halving::default()));
-                assert!(brute.counts.pairs_tested > 50 * counts.pairs_tested);
+                let saved = brute.counts.pairs_tested as f64 / counts.pairs_tested as f64;
+                assert!(saved > 15.0, "{surfaces} surfaces, normal {normal:?}: {saved}");
                 assert_eq!(without_counts(seen), without_counts(brute));
             }
         }
@@ -97,7 +98,7 @@ fn at_most_eight_lines_are_seen() {
             line_width: 40.0,
             ..Node::default()
         };
-        let nodes: Vec<_> = (0..cards).map(|number| [(Default::default(), node(number))]).collect();
+        let nodes: Vec<_> = (0..cards).map(|number| [(NodePath::CAMERA, node(number))]).collect();
         let samples: Vec<_> = nodes
             .iter()
             .map(|nodes| HandMadeSample { offset: [0.5, 0.5], nodes, ..HandMadeSample::default() })
