@@ -287,6 +287,7 @@ impl<const OWN: bool, const DIFFER: u8, const TYPED: bool> Score<'_, OWN, DIFFER
         let mixed = columns.tests.rows(if DIFFER == Differ::MIXED { count } else { 0 });
         let (own, own_facet, common) = (target.features, *own_facet, *tests);
         let own_hit = !own.is_miss();
+        let by_type = types.map(TypeRules::radii_squared).unwrap_or_default();
 
         let mut best = NONE;
         for i in 0..count {
@@ -322,9 +323,9 @@ impl<const OWN: bool, const DIFFER: u8, const TYPED: bool> Score<'_, OWN, DIFFER
                 differs |= reasons.overlap;
             }
             let mut radius_squared = if OWN { target.radius_squared } else { radius_squared[i] };
-            if let (true, Some(types)) = (TYPED, types) {
+            if TYPED {
                 reasons.miss = !own_hit | (object[i] == 0);
-                radius_squared = reasons.radius_squared(types, radius_squared);
+                radius_squared = reasons.radius_squared(by_type, radius_squared);
             }
 
             let score = if OWN {

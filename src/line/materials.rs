@@ -71,8 +71,22 @@ impl MaterialTests {
 /// Whether targets and neighbours at least this far apart may make lines.
 #[inline]
 pub(super) fn may_matter(rules: &Rules, targets: &Bounded<'_>, neighbors: &Bounded<'_>, gap_squared: f32) -> bool {
-    let near = gap_squared < targets.bounds.radius_squared.max(neighbors.bounds.radius_squared);
-    near && may_differ(rules, targets, neighbors, gap_squared)
+    let near = |targets: f32, neighbors: f32| gap_squared < targets.max(neighbors);
+    near(targets.bounds.radius_squared, neighbors.bounds.radius_squared)
+        && (rules.types().is_none() || {
+            let [own, other] =
+                [targets, neighbors].map(|styling| radii_squared(rules, targets, neighbors, styling.bounds));
+            near(own[1], other[1])
+        })
+        && may_differ(rules, targets, neighbors, gap_squared)
+}
+
+/// The least and the greatest squared radius of the lines between two sets of nodes that one of them draws; the least is
+/// ∞ if there are none.
+#[inline]
+pub(super) fn radii_squared(rules: &Rules, a: &Bounded<'_>, b: &Bounded<'_>, drawing: &Bounds) -> [f32; 2] {
+    let of_any = [drawing.thinnest_squared, drawing.radius_squared];
+    rules.types().map_or(of_any, |types| types.between(a.bounds, b.bounds, of_any, rules))
 }
 
 /// Whether targets and neighbours at least this far apart may differ.

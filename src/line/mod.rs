@@ -24,6 +24,7 @@ mod pair;
 mod rules;
 mod search;
 mod style;
+mod through;
 mod types;
 mod widening;
 mod window;

@@ -1,6 +1,8 @@
 //! One target and one neighbour: who styles the line, whether it is valid, and which of two valid pairs is seen
 //! (DESIGN section 3.2). Everything here is shared by the oracle and the search, so they cannot disagree by a rounding.
 
+use std::cmp::Ordering;
+
 use super::differ::{Features, Fired};
 use super::overlap::Facet;
 use super::window::{PathTile, alpha};
@@ -155,16 +157,19 @@ impl Pair {
     /// Whether this pair is seen rather than another of the same target.
     #[inline]
     pub(super) fn beats(&self, other: &Self) -> bool {
-        if self.rank != other.rank {
-            return self.rank.outranks(other.rank);
-        }
-        if self.distance_squared != other.distance_squared {
-            return self.distance_squared < other.distance_squared;
-        }
+        self.order(other).is_lt()
+    }
+
+    /// The order in which pairs of a target are seen, front to back.
+    #[inline]
+    pub(super) fn order(&self, other: &Self) -> Ordering {
         // Rows of a pixel are in the order of its samples; the lines of one neighbour come
         // before the target's own, in the order of its list.
         let index = |pair: &Self| (pair.pixel[1], pair.pixel[0], pair.row, pair.own, pair.surface);
-        index(self) < index(other)
+        let by_rank = self.rank.cmp(&other.rank);
+        // Squares are not NaN and no negative zero.
+        let by_key = by_rank.then(self.distance_squared.total_cmp(&other.distance_squared));
+        by_key.then_with(|| index(self).cmp(&index(other)))
     }
 }
 

@@ -17,6 +17,8 @@
 //! Where callers only ask how lines look ([`Rules::with_any_pair`]), a target is done as soon as it has a pair whose style
 //! is that of all lines that could still win; its own line looks the same whichever neighbour it is found by.
 //!
+//! What is seen through lines that are not opaque is searched by [`super::through`].
+//!
 //! Measured with `tests/bench/line_search.rs --quick`, nanoseconds per sample at (16 px, 64 samples), (32 px, 16) and
 //! (32 px, 64), of which 24 %, 47 % and 47 % are lined:
 //!
@@ -29,15 +31,16 @@
 use super::bounds::{Block, Bounded, PathBounds, PixelNodes, Stylist};
 use super::differ::{Fired, Tests};
 use super::lanes::{LaneTarget, Lanes, Origin};
-use super::materials::{certainty, may_differ, may_matter};
+use super::materials::{certainty, may_differ, may_matter, radii_squared};
 use super::overlap::Facet;
-use super::pair::{Found, LineNode, MOST_LINES, Pair, Rank, Taken, distance_squared, is_opaque};
+use super::pair::{Found, LineNode, Pair, Rank, distance_squared};
+use super::through::Through;
 use super::window::{LineStyle, PathTile, PathWindow};
 use super::{LineCounts, Rules};
 use crate::sample::PixelRect;
 
 /// How many neighbours are gathered before the targets are tested with them; each further batch is four times as large.
-const FIRST_BATCH: usize = 128;
+pub(super) const FIRST_BATCH: usize = 128;
 
 /// The line that each target sees which is not yet `lined`, in no particular order.
 pub(super) fn find(
@@ -68,6 +71,7 @@ pub(super) fn find(
     if search.tiles.is_empty() {
         return found;
     }
+    let mut through = Through::new(window, rules);
     for block in &targets.bounds.blocks {
         search.collect_blocks(block);
         if search.near_block.is_empty() {
@@ -75,26 +79,27 @@ pub(super) fn find(
         }
         for place in block.first as usize..block.end as usize {
             search.search_pixel(targets, place, lined);
-            for i in 0..search.targets.len() {
-                let Target { row, best: Some(pair), .. } = search.targets[i] else { continue };
-                let behind = search.search_behind(targets, place, i, pair);
+            let mut behind = through.search(targets, &search.near_pixel, &search.targets);
+            for (i, target) in search.targets.iter().enumerate() {
+                let Target { row, best: Some(pair), .. } = *target else { continue };
+                let behind = behind.get_mut(i).map(std::mem::take).unwrap_or_default();
                 found.push(Found { row, path: targets.nodes.path, pair, hidden: false, behind });
             }
         }
     }
-    counts.pairs_tested += search.pairs_tested;
+    counts.pairs_tested += search.pairs_tested + through.pairs_tested;
     found
 }
 
 /// A block that may hold neighbours.
 #[derive(Clone, Copy)]
-struct Near<'w> {
+pub(super) struct Near<'w> {
     /// Place of its tile in the window.
-    tile: u32,
-    bounds: &'w PathBounds,
-    block: &'w Block,
+    pub tile: u32,
+    pub bounds: &'w PathBounds,
+    pub block: &'w Block,
     /// Smallest squared distance from the pixel of targets.
-    gap_squared: f32,
+    pub gap_squared: f32,
 }
 
 /// A pixel that may hold neighbours.
@@ -110,25 +115,26 @@ struct Candidate<'w> {
 }
 
 /// A target with the best pair found so far.
-struct Target {
-    row: usize,
-    node: LineNode,
+#[derive(Clone)]
+pub(super) struct Target {
+    pub row: usize,
+    pub node: LineNode,
     facet: Facet,
     /// The squared radius of the widest line of its own, of any type.
-    reach_squared: f32,
+    pub reach_squared: f32,
     style: LineStyle,
     opaque: bool,
-    best: Option<Pair>,
+    pub best: Option<Pair>,
 }
 
 impl Target {
-    fn lane(&self) -> LaneTarget<'_> {
+    pub(super) fn lane(&self) -> LaneTarget<'_> {
         LaneTarget { node: &self.node, facet: &self.facet }
     }
 
     /// Whether a neighbour of this rank may outrank the target and all that was found so far.
     #[inline(always)]
-    fn may_win(&self, rank: Rank) -> bool {
+    pub(super) fn may_win(&self, rank: Rank) -> bool {
         rank.outranks(self.node.rank) && self.best.is_none_or(|best| !best.rank.outranks(rank))
     }
 
@@ -139,7 +145,7 @@ impl Target {
 
     /// The squared distance from which on a neighbour gives no better own line.
     #[inline(always)]
-    fn too_far(&self, distance_squared: f32) -> bool {
+    pub(super) fn too_far(&self, distance_squared: f32) -> bool {
         match self.best {
             Some(best) => distance_squared > best.distance_squared,
             None => distance_squared >= self.reach_squared,
@@ -382,6 +388,10 @@ impl<'w> Search<'w, '_> {
                     continue;
                 }
                 let bounded = bounds.of_pixel(place as usize);
+                let [thinnest_squared, widest_squared] = radii_squared(self.rules, targets, &bounded, bounded.bounds);
+                if gap_squared >= widest_squared {
+                    continue;
+                }
                 // Their materials decide.
                 let Some(certain) = certainty(self.rules, targets, &bounded, gap_squared, bounded.bounds) else {
                     continue;
@@ -389,7 +399,7 @@ impl<'w> Search<'w, '_> {
                 self.candidates.push(Candidate { tile, pixel: neighbors, gap_squared, certain });
                 if certain
                     && neighbors.bounds.best.outranks(targets.bounds.highest)
-                    && far_squared(pixel, neighbors.pixel) < neighbors.bounds.thinnest_squared
+                    && far_squared(pixel, neighbors.pixel) < thinnest_squared
                 {
                     floor = floor.better(neighbors.bounds.best);
                 }
@@ -406,7 +416,7 @@ impl<'w> Search<'w, '_> {
     /// Finds for each target that sees no other line the nearest neighbour that differs and does not outrank it.
     fn search_own(&mut self, pixel: [i32; 2], bounded: &Bounded<'_>) {
         let mut targets = std::mem::take(&mut self.targets);
-        let mut own = OwnTargets { highest: Rank::LAST, lowest: Rank::FIRST, thinnest: f32::INFINITY, limit: 0.0 };
+        let mut own = OwnTargets::NONE;
         let any_pair = self.any_pair;
         // An own line looks the same whichever its neighbour is.
         let open = |target: &&mut Target| target.wants_own() && !(any_pair && target.opaque && target.best.is_some());
@@ -420,11 +430,9 @@ impl<'w> Search<'w, '_> {
             // The last own line may be another's here.
             let limit = target.best.map_or(target.reach_squared, |best| best.distance_squared);
             own.limit = own.limit.max(limit);
-            own.thinnest = own.thinnest.min(self.rules.thinnest_squared(target.node.radius_squared));
-            own.highest = own.highest.better(target.node.rank);
-            own.lowest = own.lowest.worse(target.node.rank);
+            own.add(&target.node, self.rules);
         }
-        if own.limit > 0.0 || own.thinnest < f32::INFINITY {
+        if own.limit > 0.0 {
             self.collect_own(pixel, bounded, own);
             let (mut next, mut batch) = (0, FIRST_BATCH);
             while let Some(first) = self.candidates.get(next).map(|candidate| candidate.gap_squared) {
@@ -483,64 +491,24 @@ impl<'w> Search<'w, '_> {
                     continue;
                 }
                 let bounded = bounds.of_pixel(place as usize);
+                let [thinnest_squared, widest_squared] = radii_squared(self.rules, targets, &bounded, targets.bounds);
+                if gap_squared >= widest_squared {
+                    continue;
+                }
                 // The targets' materials decide.
                 let Some(certain) = certainty(self.rules, targets, &bounded, gap_squared, targets.bounds) else {
                     continue;
                 };
                 self.candidates.push(Candidate { tile, pixel: neighbors, gap_squared, certain });
-                let far_squared = far_squared(pixel, neighbors.pixel);
-                if certain && far_squared < own.limit.min(own.thinnest) && !neighbors.bounds.lowest.outranks(own.lowest)
-                {
-                    own.limit = far_squared;
+                if certain {
+                    let far_squared = far_squared(pixel, neighbors.pixel);
+                    own.narrow(far_squared, thinnest_squared, neighbors.bounds.lowest);
                 }
             }
         }
         self.candidates.retain(|candidate| candidate.gap_squared <= own.limit);
         self.certain = self.candidates.iter().all(|candidate| candidate.certain);
         self.candidates.sort_unstable_by(|a, b| a.gap_squared.total_cmp(&b.gap_squared));
-    }
-
-    /// What a target of the last pixel sees through the line of a pair, front to back. Plain: few lines are not opaque.
-    fn search_behind(&mut self, nodes: &PathTile<'_>, place: usize, target: usize, first: Pair) -> Vec<Pair> {
-        let mut behind = Vec::new();
-        let bounded = nodes.bounds.of_pixel(place);
-        let mut taken = Taken::default();
-        let mut last = first;
-        while behind.len() + 1 < MOST_LINES {
-            let target = &mut self.targets[target];
-            let Some(neighbors) = &self.window.tiles[last.tile as usize] else { break };
-            if is_opaque(self.rules, (nodes, target.row), (neighbors, last.row as usize), last.own) {
-                break;
-            }
-            taken.take(&neighbors.features(last.row as usize), last.own);
-            target.best = None;
-            for near in &self.near_pixel {
-                let Some(tile) = &self.window.tiles[near.tile as usize] else { continue };
-                for place in near.block.first as usize..near.block.end as usize {
-                    let pixel = &near.bounds.pixels[place];
-                    let gap_squared = pixel_gap_squared(target.node.pixel, pixel.pixel);
-                    if !may_matter(self.rules, &bounded, &near.bounds.of_pixel(place), gap_squared)
-                        || target.best.is_some_and(|best| {
-                            best.rank.outranks(pixel.bounds.best) && (!best.own || gap_squared > best.distance_squared)
-                        })
-                    {
-                        continue;
-                    }
-                    self.pairs_tested += u64::from(pixel.end - pixel.first);
-                    for row in pixel.first..pixel.end {
-                        let own = !tile.rank(row as usize).outranks(target.node.rank);
-                        if !taken.contains(&tile.features(row as usize), own) {
-                            let origin = Origin { tile: near.tile, pixel: pixel.pixel, row };
-                            keep(self.window, self.rules, target, &origin);
-                        }
-                    }
-                }
-            }
-            let Some(pair) = target.best else { break };
-            behind.push(pair);
-            last = pair;
-        }
-        behind
     }
 
     /// Tests a target with the neighbour of another target's pair.
@@ -552,7 +520,7 @@ impl<'w> Search<'w, '_> {
 }
 
 /// Keeps a pair if it is valid and beats the best.
-fn keep(window: &PathWindow<'_>, rules: &Rules, target: &mut Target, origin: &Origin) {
+pub(super) fn keep(window: &PathWindow<'_>, rules: &Rules, target: &mut Target, origin: &Origin) {
     let Origin { tile, pixel, row } = *origin;
     let Some(nodes) = &window.tiles[tile as usize] else { return };
     let t = &target.node;
@@ -591,13 +559,34 @@ fn keep(window: &PathWindow<'_>, rules: &Rules, target: &mut Target, origin: &Or
 
 /// What is known of the targets of a pixel that look for own lines.
 #[derive(Clone, Copy)]
-struct OwnTargets {
-    highest: Rank,
+pub(super) struct OwnTargets {
+    pub highest: Rank,
     lowest: Rank,
-    /// The smallest squared radius.
+    /// The smallest squared radius of a line of any type.
     thinnest: f32,
     /// The squared distance within which each is sure to find its line, if it has one.
-    limit: f32,
+    pub limit: f32,
+}
+
+impl OwnTargets {
+    pub(super) const NONE: Self =
+        Self { highest: Rank::LAST, lowest: Rank::FIRST, thinnest: f32::INFINITY, limit: 0.0 };
+
+    /// Adds a target but for its limit.
+    pub(super) fn add(&mut self, target: &LineNode, rules: &Rules) {
+        self.thinnest = self.thinnest.min(rules.thinnest_squared(target.radius_squared));
+        self.highest = self.highest.better(target.rank);
+        self.lowest = self.lowest.worse(target.rank);
+    }
+
+    /// Lowers the limit by nodes within this squared distance that surely differ from all, the last of this rank; lines
+    /// beside them have at least this squared radius.
+    pub(super) fn narrow(&mut self, far_squared: f32, thinnest_squared: f32, lowest: Rank) {
+        let in_reach = far_squared < self.thinnest.max(thinnest_squared);
+        if in_reach && far_squared < self.limit && !lowest.outranks(self.lowest) {
+            self.limit = far_squared;
+        }
+    }
 }
 
 /// The smallest squared distance that [`distance_squared`] can give between a target in one rectangle and a neighbour in
@@ -620,7 +609,7 @@ pub(super) fn pixel_gap_squared(targets: [i32; 2], neighbors: [i32; 2]) -> f32 {
 
 /// The largest squared distance between a target in one pixel and a neighbour in another.
 #[inline(always)]
-fn far_squared(targets: [i32; 2], neighbors: [i32; 2]) -> f32 {
+pub(super) fn far_squared(targets: [i32; 2], neighbors: [i32; 2]) -> f32 {
     let far = |axis: usize| ((neighbors[axis] - targets[axis]).abs() + 1) as f32;
     let (x, y) = (far(0), far(1));
     x * x + y * y

@@ -3,6 +3,7 @@
 //! The width of a pair's line is then known only once its tests are, and so is whether the pair is valid. Bounds hold the
 //! widest and the thinnest line of any type.
 
+use super::bounds::Bounds;
 use super::differ::Fired;
 use super::rules::Rules;
 use crate::scene::settings::{LineType, TypeStyle};
@@ -29,6 +30,12 @@ impl TypeRules {
         styles.iter().any(|style| *style != TypeStyle::default()).then_some(Self { radius_squared, styles })
     }
 
+    /// By type: the squared radius of its lines, below 0 where it is as the shader says.
+    #[inline(always)]
+    pub(super) fn radii_squared(&self) -> [f32; LineType::ALL.len()] {
+        self.radius_squared
+    }
+
     /// What a type changes.
     pub(super) fn style(&self, kind: Option<LineType>) -> TypeStyle {
         kind.map_or_else(TypeStyle::default, |kind| self.styles[kind as usize])
@@ -51,6 +58,48 @@ impl TypeRules {
         if asked_squared <= 0.0 { 0.0 } else { self.radius_squared.iter().copied().fold(asked_squared, f32::max) }
     }
 
+    /// The least and the greatest squared radius of the lines between two sets of nodes, of which those of any type are known:
+    /// not all types can be between them.
+    pub(super) fn between(&self, a: &Bounds, b: &Bounds, of_any: [f32; 2], rules: &Rules) -> [f32; 2] {
+        if of_any[1] <= 0.0 {
+            return of_any;
+        }
+        let tests = rules.tests();
+        let apart = a.object[1] < b.object[0] || b.object[1] < a.object[0];
+        let hits = [a, b].map(|bounds| bounds.object[0] > 0);
+        let may_be = |kind: LineType| {
+            if apart && tests.object && rules.materials().is_none() {
+                // The object test surely finds it, and nothing but a miss is a stronger reason.
+                let misses = [a, b].iter().any(|bounds| bounds.object[0] == 0);
+                return match kind {
+                    LineType::Outline => misses,
+                    // Of sets that lie apart, one has hits alone; the other may have both.
+                    LineType::Silhouette => a.object[1] > 0 && b.object[1] > 0,
+                    _ => false,
+                };
+            }
+            if hits == [true; 2] && a.object == b.object && a.object[0] == a.object[1] {
+                return match kind {
+                    LineType::Outline | LineType::Silhouette => false,
+                    LineType::Overlap => tests.reads_facets(),
+                    LineType::Material => {
+                        tests.shader && (a.shaders() != b.shaders() || a.shaders()[0] < a.shaders()[1])
+                    }
+                    LineType::Crease => tests.chord_squared < f32::INFINITY,
+                    LineType::Uv => tests.uv_squared < f32::INFINITY,
+                    LineType::Feature => tests.feature < f32::INFINITY,
+                };
+            }
+            true
+        };
+        let none = [f32::INFINITY, 0.0];
+        LineType::ALL.into_iter().filter(|kind| may_be(*kind)).fold(none, |[least, greatest], kind| {
+            let own = self.radius_squared[kind as usize];
+            let [low, high] = if own >= 0.0 { [own; 2] } else { of_any };
+            [least.min(low), greatest.max(high)]
+        })
+    }
+
     /// The squared radius of the thinnest line of any type, 0 if a type is not drawn.
     pub(super) fn thinnest_squared(&self, asked_squared: f32) -> f32 {
         self.radius_squared.iter().copied().filter(|own| *own >= 0.0).fold(asked_squared, f32::min)
@@ -70,11 +119,12 @@ pub(super) struct LaneReasons {
 }
 
 impl LaneReasons {
-    /// From the weakest reason to the strongest: the last word counts.
+    /// From the weakest reason to the strongest: the last word counts. By type the squared radius, see [`TypeRules::radii_squared`]; by
+    /// value, so that lanes choose between registers and gather nothing.
     #[inline(always)]
-    pub(super) fn radius_squared(self, types: &TypeRules, asked_squared: f32) -> f32 {
+    pub(super) fn radius_squared(self, by_type: [f32; LineType::ALL.len()], asked_squared: f32) -> f32 {
         let Self { miss, object, overlap, shader, normal, uv, feature } = self;
-        let mut radius_squared = asked_squared;
+        let mut own = UNCHANGED;
         for (reason, kind) in [
             (feature & !miss, LineType::Feature),
             (uv & !miss, LineType::Uv),
@@ -84,9 +134,9 @@ impl LaneReasons {
             (object, LineType::Silhouette),
             (miss & (object | shader), LineType::Outline),
         ] {
-            radius_squared = if reason { types.radius_squared(kind, asked_squared) } else { radius_squared };
+            own = if reason { by_type[kind as usize] } else { own };
         }
-        radius_squared
+        if (own >= 0.0) & (asked_squared > 0.0) { own } else { asked_squared }
     }
 }
 
@@ -120,7 +170,7 @@ mod tests {
             };
             for asked in [0.0, 0.3, 9.0] {
                 let expected = types.radius_squared_of(fired, asked);
-                assert_eq!(reasons.radius_squared(&types, asked), expected, "{fired:?}");
+                assert_eq!(reasons.radius_squared(types.radii_squared(), asked), expected, "{fired:?}");
                 assert!(types.thinnest_squared(asked) <= expected && expected <= types.widest_squared(asked));
             }
         }

@@ -10,4 +10,6 @@ mod lists;
 mod objects;
 mod overlap;
 pub mod picture;
+mod scripts;
 mod seen;
+mod through;

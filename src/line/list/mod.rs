@@ -37,10 +37,12 @@
 pub(super) mod bounds;
 pub(super) mod brute;
 pub(super) mod search;
+mod through;
 
 use super::differ::{Features, Tests};
 use super::overlap::Facet;
 use super::pair::{Pair, Rank};
+use super::through::Side;
 use super::window::{PathTile, PathWindow, alpha, features};
 use super::{Fired, LineScript, LineType, Rules};
 use crate::sample::{Column, NodeColumns};
@@ -84,6 +86,11 @@ impl Surface {
             radius_squared: radii_squared.get(row),
             facet: if rules.tests().reads_facets() { Facet::of(nodes, row) } else { Facet::NONE },
         }
+    }
+
+    /// Its object and material.
+    fn side(&self) -> Side {
+        (self.features.object, self.features.shader)
     }
 
     /// Whether its material finds that another surface differs, on rays that lie so far apart on the film.

@@ -11,14 +11,16 @@
 //! Where callers only ask how lines look ([`Rules::with_any_pair`](crate::line::Rules::with_any_pair)) and all lines near by
 //! have one opaque style, nearer pixels come first and a target is done with the first line it sees. Hidden lines all
 //! have one style.
+//!
+//! What is seen through lines that are not opaque is searched by [`super::through`].
 
 use super::bounds::Lists;
-use super::brute::other_side;
-use super::{Kind, List, Search, Surface, draws_at, draws_own, is_opaque, push_list};
+use super::{Kind, List, Search, Surface, draws_at, draws_own, push_list};
 use crate::line::bounds::{Bounded, Stylist};
 use crate::line::materials::may_differ;
-use crate::line::pair::{Found, LineNode, MOST_LINES, Pair, Rank, Taken, distance_squared};
+use crate::line::pair::{Found, LineNode, Pair, Rank, distance_squared};
 use crate::line::search::{pixel_gap_squared, pixel_rect, rect_gap_squared};
+use crate::line::through::Side;
 use crate::line::window::{LineStyle, PathTile, style};
 use crate::line::{LineCounts, Rules};
 
@@ -35,10 +37,10 @@ pub(in crate::line) fn find(search: &Search<'_, '_>, skipped: &[bool], counts: &
         }
         for place in block.first as usize..block.end as usize {
             scratch.search_pixel(place, skipped);
-            for target in 0..scratch.targets.len() {
-                let Target { row, best: Some(pair), .. } = scratch.targets[target] else { continue };
-                let behind =
-                    if search.kind == Kind::Visible { scratch.search_behind(target, pair) } else { Vec::new() };
+            let mut behind = if search.kind == Kind::Visible { scratch.search_through() } else { Vec::new() };
+            for (i, target) in scratch.targets.iter().enumerate() {
+                let Target { row, best: Some(pair), .. } = *target else { continue };
+                let behind = behind.get_mut(i).map(std::mem::take).unwrap_or_default();
                 let hidden = search.kind == Kind::Hidden;
                 found.push(Found { row, path: targets.nodes.path, pair, hidden, behind });
             }
@@ -50,15 +52,15 @@ pub(in crate::line) fn find(search: &Search<'_, '_>, skipped: &[bool], counts: &
 
 /// What targets may see of some neighbours.
 #[derive(Clone, Copy)]
-struct Sight {
+pub(super) struct Sight {
     /// No line of a neighbour, or none at all if hidden ones are searched, outranks this.
-    best: Rank,
+    pub best: Rank,
     /// Whether they may see lines of neighbours; if hidden ones are searched, any.
-    others: bool,
+    pub others: bool,
     /// Whether they may see their own.
-    own: bool,
+    pub own: bool,
     /// The widest line's, of those that the targets do not draw themselves.
-    radius_squared: f32,
+    pub radius_squared: f32,
     /// The style of the neighbours' lines.
     style: Styles,
 }
@@ -93,53 +95,53 @@ struct Near<'w, 'a> {
 
 /// A pixel that may hold neighbours.
 #[derive(Clone, Copy)]
-struct Candidate<'w, 'a> {
-    index: u32,
-    tile: &'w PathTile<'a>,
+pub(super) struct Candidate<'w, 'a> {
+    pub index: u32,
+    pub tile: &'w PathTile<'a>,
     /// Its place in the bounds of its tile.
-    place: usize,
+    pub place: usize,
     /// Smallest squared distance from the pixel of targets.
     gap_squared: f32,
-    sight: Sight,
+    pub sight: Sight,
     /// Where its neighbours are in [`Scratch::neighbors`], once gathered.
     gathered: Option<(u32, u32)>,
 }
 
 /// A neighbour with its list in [`Scratch::surfaces`].
 #[derive(Clone, Copy)]
-struct Neighbor {
-    offset: [f32; 2],
-    row: u32,
+pub(super) struct Neighbor {
+    pub offset: [f32; 2],
+    pub row: u32,
     first: u32,
     end: u32,
     full: bool,
 }
 
 /// A target with its list in [`Scratch::surfaces`] and the best pair found so far.
-struct Target {
-    row: usize,
-    node: LineNode,
-    list: Neighbor,
+pub(super) struct Target {
+    pub row: usize,
+    pub node: LineNode,
+    pub list: Neighbor,
     /// The style of its own line, if that is opaque.
     style: Option<LineStyle>,
-    best: Option<Pair>,
+    pub best: Option<Pair>,
     /// Whether nothing can change how it looks.
     settled: bool,
 }
 
-struct Scratch<'w, 'a> {
-    search: Search<'w, 'a>,
+pub(super) struct Scratch<'w, 'a> {
+    pub search: Search<'w, 'a>,
     any_pair: bool,
     tiles: Vec<(u32, &'w PathTile<'a>)>,
     near_block: Vec<Near<'w, 'a>>,
-    candidates: Vec<Candidate<'w, 'a>>,
+    pub candidates: Vec<Candidate<'w, 'a>>,
     /// Lists of targets and neighbours of the current pixel.
     surfaces: Vec<Surface>,
-    neighbors: Vec<Neighbor>,
-    targets: Vec<Target>,
+    pub neighbors: Vec<Neighbor>,
+    pub targets: Vec<Target>,
     /// The last line of a neighbour that was found: likely the next one, too.
     last_other: Option<Pair>,
-    pairs_tested: u64,
+    pub pairs_tested: u64,
 }
 
 impl<'w, 'a> Scratch<'w, 'a> {
@@ -330,7 +332,7 @@ impl<'w, 'a> Scratch<'w, 'a> {
             for target in targets.iter_mut().filter(|target| open(target)) {
                 self.pairs_tested += u64::from(end - first);
                 for n in &self.neighbors[first as usize..end as usize] {
-                    self.see_others(target, n, pixel, index, None);
+                    self.see_others(target, n, pixel, index);
                     if style.is_some() && target.best.is_some() {
                         target.settled = true;
                         break;
@@ -370,7 +372,7 @@ impl<'w, 'a> Scratch<'w, 'a> {
             for target in targets.iter_mut().filter(|target| open(target)) {
                 self.pairs_tested += u64::from(end - first);
                 for n in &self.neighbors[first as usize..end as usize] {
-                    self.see_own(target, n, pixel, index, None);
+                    self.see_own(target, n, pixel, index, |_| true);
                     // An own line looks the same whichever its neighbour is.
                     if self.any_pair && target.style.is_some() && target.best.is_some() {
                         target.settled = true;
@@ -413,50 +415,8 @@ impl<'w, 'a> Scratch<'w, 'a> {
         self.targets = targets;
     }
 
-    /// What a target of the last pixel sees through the line of a pair, front to back. Plain: few lines are not opaque.
-    fn search_behind(&mut self, target: usize, first: Pair) -> Vec<Pair> {
-        let Search { window, targets: tile, rules, .. } = self.search;
-        let mut behind = Vec::new();
-        let mut taken = Taken::default();
-        let mut last = first;
-        while behind.len() + 1 < MOST_LINES {
-            let Some(neighbors) = &window.tiles[last.tile as usize] else { break };
-            let row = self.targets[target].row;
-            if is_opaque(rules, (tile, row), neighbors, &last) {
-                break;
-            }
-            taken.take(&other_side(neighbors, &last), last.own);
-            let mut targets = std::mem::take(&mut self.targets);
-            let searched = &mut targets[target];
-            searched.best = None;
-            for next in 0..self.candidates.len() {
-                let Candidate { sight, .. } = self.candidates[next];
-                let may_win = searched
-                    .best
-                    .is_none_or(|best| (sight.others && !best.rank.outranks(sight.best)) || (sight.own && best.own));
-                if !may_win {
-                    continue;
-                }
-                let (first, end) = self.gathered(next);
-                let Candidate { index, tile, place, .. } = self.candidates[next];
-                let pixel = tile.bounds.pixels[place].pixel;
-                self.pairs_tested += u64::from(end - first);
-                for n in &self.neighbors[first as usize..end as usize] {
-                    self.see_others(searched, n, pixel, index, Some(&taken));
-                    self.see_own(searched, n, pixel, index, Some(&taken));
-                }
-            }
-            let best = searched.best;
-            self.targets = targets;
-            let Some(pair) = best else { break };
-            behind.push(pair);
-            last = pair;
-        }
-        behind
-    }
-
     /// Orders candidates by distance, or by rank and then distance.
-    fn sort_candidates(&mut self, nearest: bool) {
+    pub(super) fn sort_candidates(&mut self, nearest: bool) {
         self.candidates.sort_unstable_by(|a, b| {
             let by_gap = a.gap_squared.total_cmp(&b.gap_squared);
             let by_rank = a.sight.best.cmp(&b.sight.best);
@@ -466,7 +426,7 @@ impl<'w, 'a> Scratch<'w, 'a> {
     }
 
     /// The neighbours of a candidate, in [`Self::neighbors`].
-    fn gathered(&mut self, candidate: usize) -> (u32, u32) {
+    pub(super) fn gathered(&mut self, candidate: usize) -> (u32, u32) {
         let Candidate { tile, place, gathered, .. } = self.candidates[candidate];
         gathered.unwrap_or_else(|| {
             let first = self.neighbors.len() as u32;
@@ -489,13 +449,13 @@ impl<'w, 'a> Scratch<'w, 'a> {
         }
     }
 
-    fn list(&self, of: &Neighbor) -> List<'_> {
+    pub(super) fn list(&self, of: &Neighbor) -> List<'_> {
         List { surfaces: &self.surfaces[of.first as usize..of.end as usize], full: of.full }
     }
 
-    /// Keeps the best line of a neighbour that a target sees, unless it is taken.
+    /// Keeps the best line of a neighbour that a target sees.
     #[inline]
-    fn see_others(&self, target: &mut Target, n: &Neighbor, pixel: [i32; 2], tile: u32, taken: Option<&Taken>) {
+    fn see_others(&self, target: &mut Target, n: &Neighbor, pixel: [i32; 2], tile: u32) {
         let distance_squared = distance_squared(&target.node, pixel, n.offset);
         let rules = self.search.rules;
         for (place, s) in (0..).zip(self.list(n).surfaces) {
@@ -506,16 +466,22 @@ impl<'w, 'a> Scratch<'w, 'a> {
             if target.best.is_none_or(|best| pair.beats(&best))
                 && draws_at(&self.list(&target.list), s, place, distance_squared, rules)
                 && distance_squared < s.radius_squared_beside(self.list(&target.list).first(), distance_squared, rules)
-                && !taken.is_some_and(|taken| taken.contains(&s.features, false))
             {
                 target.best = Some(pair);
             }
         }
     }
 
-    /// Keeps the own line of a target if a neighbour lacks it, unless it is taken.
+    /// Keeps the own line of a target if a neighbour lacks it, whose first surface is of a side that `may_border` it.
     #[inline]
-    fn see_own(&self, target: &mut Target, n: &Neighbor, pixel: [i32; 2], tile: u32, taken: Option<&Taken>) {
+    pub(super) fn see_own(
+        &self,
+        target: &mut Target,
+        n: &Neighbor,
+        pixel: [i32; 2],
+        tile: u32,
+        may_border: impl Fn(Side) -> bool,
+    ) {
         let distance_squared = distance_squared(&target.node, pixel, n.offset);
         let rules = self.search.rules;
         if distance_squared >= rules.widest_squared(target.node.radius_squared) {
@@ -527,7 +493,7 @@ impl<'w, 'a> Scratch<'w, 'a> {
             && draws_own(&self.list(&target.list), &list, distance_squared, rules)
             && distance_squared
                 < self.list(&target.list).first().radius_squared_beside(list.first(), distance_squared, rules)
-            && !taken.is_some_and(|taken| taken.contains(&list.first().features, true))
+            && may_border(list.first().side())
         {
             target.best = Some(pair);
         }
@@ -570,7 +536,7 @@ impl<'w, 'a> Scratch<'w, 'a> {
         };
         self.pairs_tested += targets.len() as u64;
         for target in targets {
-            self.see_others(target, &neighbor, pair.pixel, pair.tile, None);
+            self.see_others(target, &neighbor, pair.pixel, pair.tile);
         }
     }
 }
@@ -578,7 +544,7 @@ impl<'w, 'a> Scratch<'w, 'a> {
 /// The smallest squared distance that [`distance_squared`] can give between a target and a neighbour in a pixel: offsets are
 /// 0 … 1, and every step of it is monotone.
 #[inline]
-fn gap_squared(target: &LineNode, pixel: [i32; 2]) -> f32 {
+pub(super) fn gap_squared(target: &LineNode, pixel: [i32; 2]) -> f32 {
     let gap = |axis: usize| {
         let pixels = (pixel[axis] - target.pixel[axis]) as f32;
         (pixels + (0.0 - target.offset[axis])).max(-(pixels + (1.0 - target.offset[axis]))).max(0.0)
