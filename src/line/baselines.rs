@@ -277,7 +277,7 @@ impl Draws {
     fn below(&mut self, count: u32) -> u32 {
         let bits = step(self.key ^ step(self.drawn));
         self.drawn += 1;
-        (u64::from(bits) * u64::from(count) >> 32) as u32
+        ((u64::from(bits) * u64::from(count)) >> 32) as u32
     }
 
     /// One of the nodes in a target's disc: the place of its tile in the window, its pixel and its row. `None` where there

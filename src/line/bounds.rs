@@ -407,7 +407,7 @@ impl PathBounds {
                     first,
                     end: last,
                     bounds: match of_misses {
-                        Some(bounds) => bounds.clone(),
+                        Some(bounds) => *bounds,
                         None => of_rows(&self.radius_squared, nodes, start, end, rules),
                     },
                 });
@@ -425,7 +425,7 @@ impl PathBounds {
             return;
         }
         let of_all = || pixels.iter().fold(Bounds::EMPTY, |all, pixel| all.union(&pixel.bounds, nodes, rules));
-        let bounds = of_misses.cloned().unwrap_or_else(of_all);
+        let bounds = of_misses.copied().unwrap_or_else(of_all);
         let shape = self.shapes.get(first..).unwrap_or_default().iter().fold(Shape::EMPTY, |all, one| all.union(one));
         let facets = FacetBounds::of_all(self.facets.get(first..).unwrap_or_default());
         let start = self.by_rank.len();

@@ -171,7 +171,7 @@ fn unit(vectors: &Axes, i: usize, flip: f32, units: &mut Axes) -> bool {
     for axis in 0..3 {
         units[axis][i] = vectors[axis][i] * scale * flip;
     }
-    (square >= SOUND_SQUARES.start) & (square < SOUND_SQUARES.end)
+    SOUND_SQUARES.contains(&square)
 }
 
 #[inline(always)]
